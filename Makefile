@@ -1,0 +1,55 @@
+# Every target makes what it needs. `make help` lists them.
+MAKEFLAGS += --no-print-directory
+.DEFAULT_GOAL := help
+
+PYTHON ?= python3
+MODULE ?=
+SIM    ?=
+DATA   ?=
+SEED   ?=
+WAVES  ?=
+
+VENV   := .venv
+READY  := $(VENV)/.ready
+RUN    := $(VENV)/bin/python
+SIM_FLAGS := $(if $(MODULE),--module '$(MODULE)') $(if $(SIM),--sim '$(SIM)') $(if $(DATA),--data '$(DATA)') \
+             $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(WAVES)),--waves)
+
+.PHONY: help sim test lint format mutate precision readme clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+sim: $(READY) ## simulate every module against its model [MODULE=] [SIM=verilator|icarus] [DATA=file.npz] [SEED=] [WAVES=1]
+	@$(RUN) scripts/sim.py $(SIM_FLAGS)
+
+test: $(READY) ## run all tests: the model's and the RTL's, on every simulator found
+	@$(RUN) -m pytest -n auto
+
+lint: $(READY) ## ruff, mypy, and Verilator and Verible on the RTL
+	@$(RUN) scripts/lint.py
+
+format: $(READY) ## lay out Python and SystemVerilog
+	@$(RUN) scripts/lint.py --fix
+
+mutate: $(READY) ## break the RTL line by line and count what the benches catch
+	@$(RUN) scripts/mutate.py
+
+precision: $(READY) ## Monte Carlo of the echo position against the Cramér–Rao bound [SEED=]
+	@$(RUN) -m openecho.study.precision $(if $(SEED),--seed '$(SEED)')
+
+readme: $(READY) ## copy the figures of build/reports/ into README.md
+	@$(RUN) scripts/readme.py
+
+clean: ## remove everything that make made
+	rm -rf build $(VENV) .mypy_cache .pytest_cache .ruff_cache
+
+# All set-up is here: one virtual environment with what pyproject.toml asks for, marked ready only when complete.
+$(READY): pyproject.toml
+	@command -v $(PYTHON) >/dev/null || { echo 'error: $(PYTHON) not found: expected Python 3.11 or newer' >&2; exit 2; }
+	@$(PYTHON) -c 'import sys; v = sys.version_info; v >= (3, 11) or sys.exit( "error: $(PYTHON) is Python %d.%d: expected 3.11 or newer (make PYTHON=...)" % v[:2])'
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { echo 'error: $(PYTHON) has no venv module: expected it installed (Debian: apt-get install python3-venv)' >&2; exit 2; }
+	@echo 'setting up $(VENV) from pyproject.toml (once, a minute or two)'
+	@$(RUN) -c '' 2>/dev/null || $(PYTHON) -m venv --clear $(VENV)
+	@$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@

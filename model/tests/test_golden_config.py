@@ -1,0 +1,69 @@
+"""What a configuration accepts, and the widths that follow from it."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from openecho.golden import PAPER_TAPS, Config, filter, second_difference
+
+
+def test_default_widths() -> None:
+    config = Config()
+    assert (config.sum_w, config.first_w, config.second_w) == (24, 20, 19)
+    assert (config.idx_w, config.len_w, config.pos_w, config.amp_w, config.word_w) == (12, 13, 28, 19, 32)
+    assert (config.n_raw, config.k_raw) == (32, 48)
+
+
+@pytest.mark.parametrize(("max_samples", "idx_w"), [(4096, 12), (4097, 13), (65536, 16), (22, 5)])
+def test_index_width_holds_the_last_index(max_samples: int, idx_w: int) -> None:
+    assert Config(max_samples=max_samples).idx_w == idx_w
+
+
+@pytest.mark.parametrize(("max_samples", "frac", "word_w"), [(32768, 16, 32), (65536, 16, 64), (4096, 20, 64)])
+def test_words_are_wide_where_a_signed_position_needs_it(max_samples: int, frac: int, word_w: int) -> None:
+    assert Config(max_samples=max_samples, frac=frac).word_w == word_w
+
+
+@pytest.mark.parametrize("taps", [PAPER_TAPS, (-32768, 32767, 32767, -32768), (-1, -2, -3, -2, -1), (1, 0, 0, 1)])
+def test_widths_hold_the_worst_waveform(taps: tuple[int, ...]) -> None:
+    config = Config(taps=taps, sample_w=16)
+    for width, differences in ((config.sum_w, 0), (config.first_w, 1), (config.second_w, 2)):
+        # Full scale wherever the tap of that sign is met: the greatest and the least sum that any waveform has.
+        merged = np.array(taps)
+        for _ in range(differences):
+            merged = np.diff(merged, prepend=0, append=0)
+        for worst in (merged[::-1] > 0, merged[::-1] < 0):
+            index = np.arange(worst.size)
+            beats = {"sample": 65535 * worst, "index": index, "overlong": 0 * index, "last": index == worst.size - 1}
+            filtered = filter(beats, config)
+            field = ("sum", "first", "second")[differences]
+            value = (filtered | second_difference(filtered, config))[field][-1]
+            assert -(1 << (width - 1)) <= value < 1 << (width - 1)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"sample_w": 7}, "sample_w: found 7, expected an integer from 8 to 16"),
+        ({"sample_w": 17}, "sample_w: found 17, expected an integer from 8 to 16"),
+        ({"sample_w": 11.5}, "sample_w: found 11.5, expected an integer from 8 to 16"),
+        ({"frac": 3}, "frac: found 3, expected an integer from 4 to 24"),
+        ({"frac": 25}, "frac: found 25, expected an integer from 4 to 24"),
+        ({"max_samples": 21}, "max_samples: found 21, expected an integer from 22 to 65536"),
+        ({"max_samples": 65537}, "max_samples: found 65537, expected an integer from 22 to 65536"),
+        ({"taps": (1, 2, 1)}, "number of taps: found 3, expected an integer from 4 to 48"),
+        ({"taps": (1,) * 49}, "number of taps: found 49, expected an integer from 4 to 48"),
+        ({"taps": (1, 2, 3, 1)}, r"taps: found \(1, 2, 3, 1\), expected a symmetric set"),
+        ({"taps": (32768,) * 4}, "tap: found 32768, expected an integer from -32768 to 32767"),
+        ({"taps": (0.5,) * 4}, "tap: found 0.5, expected an integer from -32768 to 32767"),
+        ({"min_interval": 4096}, "min_interval: found 4096, expected an integer from 0 to 4095"),
+        ({"min_amplitude": -1}, "min_amplitude: found -1, expected an integer from 0 to 2047"),
+        ({"n": 16.0}, "n: found 16.0, expected a multiple of 1/16 from 0 to 15.9375"),
+        ({"n": float("nan")}, "n: found nan, expected a multiple of 1/16 from 0 to 15.9375"),
+        ({"k": 0.1}, "k: found 0.1, expected a multiple of 1/16 from 0 to 15.9375"),
+    ],
+)
+def test_illegal_configurations_are_named_in_one_line(settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=f"^{message}$"):
+        Config(**settings)
