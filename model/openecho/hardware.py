@@ -1,0 +1,242 @@
+"""The RTL modules: the one table that simulation, tests, lint and synthesis read. A new module is one row."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from openecho import golden
+from openecho.golden import Beats, Config
+
+ROOT = Path(__file__).resolve().parents[2]
+"""The repository."""
+RTL = ROOT / "rtl"
+PACKAGE = RTL / "openecho_pkg.sv"
+
+
+@dataclass(frozen=True)
+class Stream:
+    """A valid/ready stream of a module.
+
+    Attributes
+    ----------
+    prefix : str
+        Ports are named `prefix_valid`, `prefix_ready`, and so on.
+    fields : tuple of str
+        Payload ports besides `last`; the keys of the golden model's `Beats`.
+    last : bool
+        Whether a port `last` ends a waveform. Without one each beat stands for a waveform.
+    words : int
+        Numbers in each field: 1, or more for a field that packs several, the first in its lowest bits.
+    """
+
+    prefix: str
+    fields: tuple[str, ...]
+    last: bool = True
+    words: int = 1
+
+
+@dataclass(frozen=True)
+class Module:
+    """One RTL module.
+
+    Attributes
+    ----------
+    name : str
+        As in the golden model; file and module are `openecho_<name>`.
+    parameters : tuple of str
+        Parameters that follow from a `Config`, keys of `parameters`.
+    inputs, outputs : tuple of Stream
+        In the order of the golden function's arguments and results.
+    settings : tuple of str
+        Run-time input ports, keys of `settings`.
+    golden : callable or None
+        The bit-exact model: Beats of each input and a `Config` to the Beats of each output. None for a part that is
+        verified inside the modules that use it.
+    latency : dict of str to callable
+        For an output's prefix, the cycles from the transfer of the beat that determines an output beat to the transfer
+        of that beat, in an idle module whose sink is ready.
+    """
+
+    name: str
+    parameters: tuple[str, ...] = ()
+    inputs: tuple[Stream, ...] = ()
+    outputs: tuple[Stream, ...] = ()
+    settings: tuple[str, ...] = ()
+    golden: Callable[..., Beats | tuple[Beats, ...]] | None = None
+    latency: dict[str, Callable[[Config], int]] | None = None
+
+    @property
+    def top(self) -> str:
+        """Name in SystemVerilog."""
+        return f"openecho_{self.name}"
+
+    @property
+    def streams(self) -> tuple[Stream, ...]:
+        """Inputs, then outputs."""
+        return self.inputs + self.outputs
+
+    @property
+    def sources(self) -> tuple[Path, ...]:
+        """Files in the order of compilation: the package, what the module uses, the module."""
+        return (PACKAGE, *_sources(RTL / f"{self.top}.sv"))
+
+    @property
+    def takes_samples(self) -> bool:
+        """Whether a beat of the first input is a sample, of which the module must take one a clock."""
+        return bool(self.inputs) and not {"sample", "raw"}.isdisjoint(self.inputs[0].fields)
+
+    def expected(self, inputs: dict[str, Beats], config: Config) -> dict[str, Beats]:
+        """Beats that the golden model puts on each output, by prefix, for the beats on each input."""
+        if self.golden is None:
+            raise ValueError(f"{self.name}: no golden model, expected one of {', '.join(bench_names())}")
+        results = self.golden(*(inputs[stream.prefix] for stream in self.inputs), config)
+        by_output = results if isinstance(results, tuple) else (results,)
+        return {stream.prefix: beats for stream, beats in zip(self.outputs, by_output, strict=True)}
+
+
+_SAMPLES = ("sample", "index", "overlong")
+_SUMS = ("sum", "raw", "index", "overlong")
+_DIFFERENCES = ("second", "first", "raw", "index", "overlong")
+_COMPONENTS = ("left", "right", "peak", "maximum", "length", "flags")
+_ECHOES = ("centre", "peak", "width", "time", "amplitude", "flags")
+_NOISE = Stream("noise", ("mean", "deviation", "none"), last=False)
+_RECORDS = Stream("m", ("record",), words=8)
+_FILTER = ("SAMPLE_W", "MAX_SAMPLES", "TAP_COUNT", "TAPS")
+_POSITIONS = ("SAMPLE_W", "FRAC", "MAX_SAMPLES")
+_ALL = ("SAMPLE_W", "FRAC", "MAX_SAMPLES", "TAP_COUNT", "TAPS")
+
+MODULES: dict[str, Module] = {
+    row.name: row
+    for row in (
+        Module(
+            name="reader",
+            parameters=("SAMPLE_W", "MAX_SAMPLES"),
+            inputs=(Stream("s", ("sample",)),),
+            outputs=(Stream("m", _SAMPLES), _NOISE),
+            golden=golden.reader,
+            latency={"m": lambda _: 1},
+        ),
+        Module(
+            name="filter",
+            parameters=_FILTER,
+            inputs=(Stream("s", _SAMPLES),),
+            outputs=(Stream("m", _SUMS),),
+            golden=golden.filter,
+            latency={"m": lambda _: 4},
+        ),
+        Module(
+            name="second_difference",
+            parameters=_FILTER,
+            inputs=(Stream("s", _SUMS),),
+            outputs=(Stream("m", _DIFFERENCES),),
+            golden=golden.second_difference,
+            latency={"m": lambda _: 2},
+        ),
+        Module(
+            name="inflection",
+            parameters=_ALL,
+            inputs=(Stream("s", _DIFFERENCES),),
+            outputs=(Stream("m", _COMPONENTS),),
+            settings=("min_interval",),
+            golden=golden.inflection,
+        ),
+        Module(
+            name="parameters",
+            parameters=_POSITIONS,
+            inputs=(Stream("s", _COMPONENTS), _NOISE),
+            outputs=(Stream("m", _ECHOES),),
+            settings=("n", "min_amplitude", "k"),
+            golden=golden.parameters,
+        ),
+        Module(
+            name="output",
+            parameters=_POSITIONS,
+            inputs=(Stream("s", _ECHOES),),
+            outputs=(_RECORDS,),
+            golden=golden.output,
+        ),
+        Module(
+            name="core",
+            parameters=_ALL,
+            inputs=(Stream("s", ("sample",)),),
+            outputs=(_RECORDS,),
+            settings=("n", "min_interval", "min_amplitude", "k"),
+            golden=golden.core,
+        ),
+        Module(name="check", parameters=("SAMPLE_W", "FRAC", "MAX_SAMPLES", "TAP_COUNT")),
+        Module(name="noise", parameters=("SAMPLE_W",)),
+        Module(name="divide"),
+        Module(name="fifo"),
+        Module(name="square_root"),
+    )
+}
+
+
+def bench_names() -> tuple[str, ...]:
+    """Modules that have a golden model and so a bench of their own."""
+    return tuple(name for name, row in MODULES.items() if row.golden is not None)
+
+
+def parameters(config: Config) -> dict[str, str]:
+    """Values of all RTL parameters as SystemVerilog literals that Icarus and Verilator both take on the command line.
+
+    The taps are the first half of the symmetric set, 16 bits each, tap 0 in the lowest.
+    """
+    half = config.taps[: (config.tap_count + 1) // 2]
+    word, total = package_constants()["TAP_W"], package_constants()["TAPS_W"]
+    flat = sum((tap & (1 << word) - 1) << word * k for k, tap in enumerate(half))
+    return {
+        "SAMPLE_W": str(config.sample_w),
+        "FRAC": str(config.frac),
+        "MAX_SAMPLES": str(config.max_samples),
+        "TAP_COUNT": str(config.tap_count),
+        "TAPS": f"{total}'h{flat:0{total // 4}x}",
+    }
+
+
+def settings(config: Config) -> dict[str, int]:
+    """Values of the run-time inputs."""
+    return {
+        "n": config.n_raw,
+        "min_interval": config.min_interval,
+        "min_amplitude": config.min_amplitude,
+        "k": config.k_raw,
+    }
+
+
+@cache
+def package_constants() -> dict[str, int]:
+    """Integer constants of the SystemVerilog package by name.
+
+    Raises
+    ------
+    ValueError
+        If a constant is not an expression of integers and constants before it.
+    """
+    values: dict[str, int] = {}
+    for name, expression in re.findall(r"^\s*localparam int (\w+) = ([^;]+);", PACKAGE.read_text(), re.MULTILINE):
+        value = None
+        for operator, term in re.findall(r"([*/+-]?)\s*(\w+)\s*", expression):
+            number = int(term) if term.isdecimal() else values[term]
+            if value is None:
+                value = number
+            elif operator == "*":
+                value *= number
+            elif operator == "/":
+                value //= number
+            else:
+                raise ValueError(f"{PACKAGE}: {name} is {expression}, expected products and quotients of integers")
+        assert value is not None
+        values[name] = value
+    return values
+
+
+def _sources(path: Path) -> tuple[Path, ...]:
+    """Files of the modules that a file instantiates, each after what it uses itself, then the file."""
+    used = re.findall(r"^\s*(openecho_\w+)\s*(?:#\s*\(|u_\w+)", path.read_text(), re.MULTILINE)
+    below = (source for name in used for source in _sources(RTL / f"{name}.sv"))
+    return tuple(dict.fromkeys((*below, path)))

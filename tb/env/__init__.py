@@ -1,0 +1,1 @@
+"""The verification environment, written once for every module."""

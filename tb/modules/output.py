@@ -1,0 +1,46 @@
+"""Module `output`: behind the parameters."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyuvm
+
+from openecho import golden
+from openecho.golden import Beats, Config
+from tb.env.bench import ModuleTest, random_pauses
+from tb.modules import parameters
+
+
+def inputs(beats: Beats, config: Config) -> dict[str, Beats]:
+    """Beats on each input for these waveforms."""
+    before = parameters.inputs(beats, config)
+    return {"s": golden.parameters(before["s"], before["noise"], config)}
+
+
+@pyuvm.test()
+class AnyFieldInItsPlace(ModuleTest):
+    """Random and extreme values in every field, negative times too; every bit must land in its word."""
+
+    async def scenario(self) -> None:
+        """Play without and with stalls."""
+        config, rng = self.config, self.rng
+        count = 400
+        last = rng.random(count) < 0.2
+        last[-1] = True
+
+        def values(low: int, high: int) -> np.ndarray:
+            anything = rng.integers(low, high, count, endpoint=True)
+            return np.where(rng.random(count) < 0.2, rng.choice([low, low + 1, high - 1, high], count), anything)
+
+        position, amplitude = (1 << config.pos_w) - 1, (1 << config.amp_w) - 1
+        beats = {
+            "centre": values(0, position),
+            "peak": np.where(last, values(0, amplitude), values(0, position)),
+            "width": np.where(last, 0, values(0, position)),
+            "time": np.where(last, 0, values(-position - 1, position)),
+            "amplitude": values(0, amplitude),
+            "flags": values(0, 7),
+            "last": last,
+        }
+        await self.play_beats("random", {"s": beats})
+        await self.play_beats("random, stalls", {"s": beats}, stalls=random_pauses(self.random, 3, 3))

@@ -1,0 +1,107 @@
+"""Every RTL module against its golden model, on every simulator, with several sets of parameters."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from openecho import golden
+from openecho.golden import Config
+from openecho.hardware import MODULES, ROOT, bench_names, package_constants, parameters
+from tb.env import coverage, runner, tests
+from tb.env.run import Run
+
+NEGATIVE = (-90, -61, -17, 40, 99, 131, 140, 133, 118, 101, 86, 75, 66, 60, 55, 52, 49, 47, 46, 46, 45, 45, 45)
+"""Half of a set of 47 taps with negative ones; its centre is stated below."""
+STEEP = (25000, *range(1400, 1400 * 24, 1400))
+"""Half of a set of 48 taps with steep edges, whose sums need more than 32 bits."""
+
+CONFIGS = {
+    "default": Config(),
+    "narrow": Config(sample_w=8, frac=4, max_samples=1100, taps=(3, 11, 16, 11, 3)),
+    "wide": Config(sample_w=16, frac=24, max_samples=1100, taps=STEEP + STEEP[::-1]),
+    "four taps": Config(sample_w=12, frac=10, max_samples=1025, taps=(-5, 9, 9, -5)),
+    "negative taps": Config(sample_w=10, max_samples=1300, taps=(*NEGATIVE, 44, *NEGATIVE[::-1]), n=1.0, k=2.5),
+}
+"""Parameters to test with. Other than the default they have a small MAX_SAMPLES, so that long waveforms cost little."""
+
+CHEAP_ON_ICARUS = ("narrow", "four taps")
+"""What Icarus, the slower simulator, runs besides the default."""
+
+ILLEGAL = {
+    "SAMPLE_W": (("7", "17"), "samples of 8 to 16 bits"),
+    "FRAC": (("3", "25"), "4 to 24 fraction bits"),
+    "TAP_COUNT": (("3", "49"), "4 to 48 taps"),
+    "MAX_SAMPLES": (("21", "65537"), "TAP_COUNT + 2 up to 65536 samples"),
+}
+"""Values just outside each parameter's range, and what the sentence that stops elaboration must say."""
+
+
+def cases() -> Iterator[object]:
+    """Every module, simulator and set of parameters that is worth its time, as pytest parameters."""
+    for simulator in runner.SIMULATORS:
+        for module in bench_names():
+            for name in CONFIGS:
+                if simulator == "verilator" or name in ("default", *CHEAP_ON_ICARUS):
+                    yield pytest.param(module, simulator, name, id=f"{module}-{simulator}-{name.replace(' ', '_')}")
+
+
+def benches(module: str) -> list[str]:
+    """Python modules with the tests of an RTL module."""
+    throughput = ["tb.env.throughput"] * MODULES[module].takes_samples
+    return ["tb.env.tests", *throughput, f"tb.modules.{module}"]
+
+
+def need(simulator: str) -> None:
+    """Skip where a simulator is missing; fail in CI, where nothing may be left out."""
+    try:
+        runner.require(simulator)
+    except runner.MissingToolError as error:
+        if os.environ.get("CI"):
+            pytest.fail(str(error))
+        pytest.skip(str(error))
+
+
+@pytest.mark.parametrize(("module", "simulator", "name"), list(cases()))
+def test_module_equals_its_model(module: str, simulator: str, name: str, tmp_path: Path) -> None:
+    need(simulator)
+    run = Run(module, CONFIGS[name], int(os.environ.get("SEED", "0")))
+    try:
+        runner.simulate(run, simulator, tmp_path, benches(module))
+    except runner.SimulationError as error:
+        pytest.fail(str(error), pytrace=False)
+
+
+@pytest.mark.parametrize("simulator", runner.SIMULATORS)
+@pytest.mark.parametrize("parameter", ILLEGAL)
+def test_illegal_parameter_stops_elaboration_with_a_sentence(parameter: str, simulator: str, tmp_path: Path) -> None:
+    need(simulator)
+    values, sentence = ILLEGAL[parameter]
+    for value in values:
+        assert sentence in runner.refusal("core", parameters(Config()) | {parameter: value}, simulator, tmp_path)
+
+
+def test_package_and_model_state_the_same_constants() -> None:
+    rtl = package_constants()
+    assert {name: rtl[name] for name in ("NOISE_SAMPLES", "AMP_FRAC", "ROOT_FRAC", "RATIO_FRAC")} == {
+        "NOISE_SAMPLES": golden.NOISE_SAMPLES,
+        "AMP_FRAC": golden.AMP_FRAC,
+        "ROOT_FRAC": golden.ROOT_FRAC,
+        "RATIO_FRAC": golden.RATIO_FRAC,
+    }
+    for name in ("SATURATED", "TRUNCATED", "NO_PEAK", "TOO_SHORT", "TOO_LONG", "NO_NOISE"):
+        assert 1 << rtl[f"FLAG_{name}"] == getattr(golden, name)
+    assert rtl["PAPER_TAP_COUNT"] == len(golden.PAPER_TAPS)
+
+
+def test_every_file_of_rtl_is_in_the_module_table() -> None:
+    in_table = {path for row in MODULES.values() for path in row.sources}
+    assert in_table == set((ROOT / "rtl").glob("*.sv"))
+
+
+def test_goals_of_the_tests_are_every_bin() -> None:
+    every_test = (tests.EveryWaveformBackToBack, tests.GapsAndStallsChangeNothing, tests.ResetInMidWaveformStartsAfresh)
+    assert frozenset().union(*(test.goals for test in every_test)) == coverage.EVERY_BIN
