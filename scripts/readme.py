@@ -1,0 +1,136 @@
+"""Copy the figures of build/reports/ into README.md, between its markers. No figure there is typed."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from openecho import report
+from openecho.hardware import ROOT, bench_names
+from openecho.study import comparison
+
+README = ROOT / "README.md"
+PICTURE = ROOT / "docs" / "core.png"
+
+
+def main() -> int:
+    """Rewrite every marked part of the README."""
+    text = README.read_text()
+    try:
+        for name, (source, lines) in PARTS.items():
+            content = json.loads((report.FOLDER / f"{source}.json").read_text())
+            text = replaced(text, name, lines(content))
+        PICTURE.parent.mkdir(exist_ok=True)
+        shutil.copyfile(report.FOLDER / PICTURE.name, PICTURE)
+    except FileNotFoundError as error:
+        print(f"error: no {error.filename}: run make sim and make precision first", file=sys.stderr)
+        return 2
+    except ValueError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    README.write_text(text)
+    return 0
+
+
+def replaced(text: str, name: str, lines: Iterable[str]) -> str:
+    """Text with other lines between the markers of a name."""
+    begin, end = f"<!-- begin {name} -->\n", f"<!-- end {name} -->"
+    if text.count(begin) != 1 or text.count(end) != 1:
+        raise ValueError(f"{README}: expected one part from {begin.strip()} to {end}")
+    before, rest = text.split(begin)
+    return before + begin + "".join(f"{line}\n" for line in lines) + end + rest.split(end)[1]
+
+
+def table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> list[str]:
+    """Lines of a Markdown table, the first column to the left and the others to the right."""
+    head = list(head)
+    rule = ["---", *["---:"] * (len(head) - 1)]
+    return ["| " + " | ".join(map(str, cells)) + " |" for cells in (head, rule, *rows)]
+
+
+def modules(content: dict[str, Any]) -> list[str]:
+    """Waveforms, mismatches and cycles of each module."""
+    found = [row["module"] for row in content["rows"]]
+    if found != list(bench_names()):
+        raise ValueError(f"sim.json has {', '.join(found)}, expected every module: run make sim")
+    head = ("module", "simulator", "waveforms", "mismatches", "latency, cycles", "cycles/waveform", "samples/waveform")
+    return table(
+        head,
+        (
+            (
+                f"`{row['module']}`",
+                row["simulator"],
+                row["waveforms"],
+                row["mismatches"],
+                span(row["latency_cycles"]),
+                f"{row['cycles_per_waveform']:g}",
+                f"{row['samples_per_waveform']:g}",
+            )
+            for row in content["rows"]
+        ),
+    )
+
+
+def span(latency: dict[str, int]) -> str:
+    """Least to greatest latency."""
+    least, most = latency["min"], latency["max"]
+    return str(least) if least == most else f"{least} to {most}"
+
+
+def precision(content: dict[str, Any]) -> list[str]:
+    """Position error as multiples of the Cramér–Rao bound."""
+    head = ("taps", "echo σ, bins", "amplitude, counts", "echoes found", "`peak`", "`centre`", "mean `width`, bins")
+    return table(
+        head,
+        (
+            (
+                f"{row['taps']}, {row['tap_count']}",
+                row["sigma"],
+                row["amplitude"],
+                f"{row['found']} of {row['waveforms']}",
+                f"{row['peak']:.2f}",
+                f"{row['centre']:.2f}",
+                f"{row['width']:.1f}",
+            )
+            for row in content["rows"]
+        ),
+    )
+
+
+def differences(content: dict[str, Any]) -> list[str]:
+    """Largest differences between the core and float64."""
+    largest = content["largest_difference"]
+    unit = dict.fromkeys(comparison.QUANTITIES, "bin") | {"amplitude": "count", "rmse": "count"}
+    rows = ((f"{name}, {unit[name]}", f"{value:.1e}") for name, value in largest.items())
+    return table(("largest difference", "core − float64"), rows)
+
+
+def echoes(content: dict[str, Any]) -> list[str]:
+    """Every echo of the reference waveforms, core and float64 side by side."""
+    head = ["waveform"]
+    head += [
+        f"{name} {side}" for name in ("centre", "width", "amplitude", "time", "RMSE") for side in ("core", "float64")
+    ]
+    rows = []
+    for number, waveform in enumerate(content["waveforms"]):
+        for at, pair in enumerate(zip(waveform["core"], waveform["float64"], strict=True)):
+            cells = [f"{echo[name]:.5f}" for name in ("centre", "width", "amplitude", "time") for echo in pair]
+            fits = [f"{waveform['rmse'][side]:.3f}" for side in ("core", "float64")] if at == 0 else ["", ""]
+            rows.append([number if at == 0 else "", *cells, *fits])
+    return table(head, rows)
+
+
+PARTS: dict[str, tuple[str, Callable[[dict[str, Any]], list[str]]]] = {
+    "modules": ("sim", modules),
+    "precision": ("precision", precision),
+    "differences": ("core_vs_float64", differences),
+    "echoes": ("core_vs_float64", echoes),
+}
+"""Marked parts of the README: the report that each is made from, and how."""
+
+
+if __name__ == "__main__":
+    sys.exit(main())

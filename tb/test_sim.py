@@ -1,0 +1,48 @@
+"""`make sim` says in one line what is wrong with its arguments, with exit status 2."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from openecho.hardware import ROOT
+
+
+def sim(*arguments: str, path: str | None = None) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | ({} if path is None else {"PATH": path})
+    command = [sys.executable, str(ROOT / "scripts" / "sim.py"), *arguments]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+
+def assert_refused(run: subprocess.CompletedProcess[str], *said: str) -> None:
+    assert run.returncode == 2, run.stderr
+    assert run.stderr.count("\n") == 1
+    assert run.stderr.startswith("error: ")
+    assert all(word in run.stderr for word in said), run.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--module", "filtre"), ("filtre", "reader, filter")),
+        (("--sim", "vcs"), ("vcs", "verilator, icarus")),
+        (("--seed", "-1"), ("-1", "whole number")),
+        (("--data", "nowhere.npz"), ("nowhere.npz", "expected .npz or .npy")),
+    ],
+)
+def test_argument_that_is_not_known_is_refused(arguments: tuple[str, ...], said: tuple[str, ...]) -> None:
+    assert_refused(sim(*arguments), *said)
+
+
+def test_counts_wider_than_a_sample_are_refused(tmp_path: Path) -> None:
+    np.save(tmp_path / "bright.npy", np.full((1, 100), 1 << 11, np.uint16))
+    assert_refused(sim("--data", str(tmp_path / "bright.npy")), "2048", "0 to 2047")
+
+
+def test_missing_compiler_is_refused(tmp_path: Path) -> None:
+    assert_refused(sim("--sim", "verilator", path=str(tmp_path)), "g++ not found", "expected it on PATH")
