@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -109,6 +110,12 @@ _FILTER = ("SAMPLE_W", "MAX_SAMPLES", "TAP_COUNT", "TAPS")
 _POSITIONS = ("SAMPLE_W", "FRAC", "MAX_SAMPLES")
 _ALL = ("SAMPLE_W", "FRAC", "MAX_SAMPLES", "TAP_COUNT", "TAPS")
 
+
+def _parameters_latency(config: Config) -> int:
+    """Cycles of `parameters`: 8, and the rows of its divider, whose ring each quotient passes six times."""
+    return 8 + 6 * math.ceil((config.pos_w + 1) / 6)
+
+
 MODULES: dict[str, Module] = {
     row.name: row
     for row in (
@@ -143,6 +150,7 @@ MODULES: dict[str, Module] = {
             outputs=(Stream("m", _COMPONENTS),),
             settings=("min_interval",),
             golden=golden.inflection,
+            latency={"m": lambda _: 3},
         ),
         Module(
             name="parameters",
@@ -151,6 +159,7 @@ MODULES: dict[str, Module] = {
             outputs=(Stream("m", _ECHOES),),
             settings=("n", "min_amplitude", "k"),
             golden=golden.parameters,
+            latency={"m": _parameters_latency},
         ),
         Module(
             name="output",
@@ -158,6 +167,7 @@ MODULES: dict[str, Module] = {
             inputs=(Stream("s", _ECHOES),),
             outputs=(_RECORDS,),
             golden=golden.output,
+            latency={"m": lambda _: 0},
         ),
         Module(
             name="core",
@@ -166,6 +176,7 @@ MODULES: dict[str, Module] = {
             outputs=(_RECORDS,),
             settings=("n", "min_interval", "min_amplitude", "k"),
             golden=golden.core,
+            latency={"m": lambda config: 1 + 4 + 2 + 3 + _parameters_latency(config)},
         ),
         Module(name="check", parameters=("SAMPLE_W", "FRAC", "MAX_SAMPLES", "TAP_COUNT")),
         Module(name="noise", parameters=("SAMPLE_W",)),

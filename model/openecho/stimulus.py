@@ -144,6 +144,10 @@ def reference_set(seed: int = 0) -> Stimulus:
     return Stimulus(samples, np.concatenate([first.length, second.length]), np.concatenate([first.truth, later]))
 
 
+QUIET = 64
+"""Samples of `directed` before many echoes: the noise is measured on the first 50, which must hold none."""
+
+
 def directed(
     sample_w: int = SAMPLE_W, length: int = 1024, tap_count: int = 20, seed: int = 0
 ) -> Iterator[tuple[str, Samples]]:
@@ -170,7 +174,8 @@ def directed(
     rng = np.random.default_rng([seed, 2])
     full = 2**sample_w - 1
     baseline = full / 64
-    noise = rng.normal(0, full / 2048, length)
+    noise = rng.normal(0, max(full / 2048, 1), length)
+    edge = (tap_count + 1) / 2  # bins from an end to the outermost second difference
     x = np.arange(length)
 
     def echo(*centre: float, width: float = 4, amplitude: float = full / 4) -> Samples:
@@ -185,12 +190,12 @@ def directed(
     yield "ramp", (x * full // max(length - 1, 1)).astype(np.uint16)
     yield "noise", echo()
     yield "saturated", echo(length / 2, width=10, amplitude=3 * full)
-    yield "cut_start", echo(0)
-    yield "cut_end", echo(length - 1)
+    yield "cut_start", echo(edge, width=max(4, edge))
+    yield "cut_end", echo(length - 1 - edge, width=max(4, edge))
     spacing = max(20, 6 * tap_count // 5)
     for count in (1, 2, 8, 16, 17):
-        if count * spacing <= length:
-            yield f"echoes_{count}", echo(*(spacing * (0.5 + np.arange(count))))
+        if QUIET + count * spacing <= length:
+            yield f"echoes_{count}", echo(*(QUIET + spacing * (0.5 + np.arange(count))))
 
 
 def _noisy(rng: np.random.Generator, length: int, echoes: list[np.ndarray]) -> Stimulus:

@@ -86,14 +86,6 @@ def test_comparison_counts_waveforms_with_other_echoes() -> None:
     assert comparison.compare(without_first, made.samples, made.length, config)["differing_waveforms"] == 1
 
 
-def test_rmse_is_that_of_equation_12() -> None:
-    echoes = np.zeros(1, stimulus.TRUTH)
-    echoes["centre"], echoes["width"], echoes["amplitude"] = 50, 6, 100
-    clean = stimulus.gaussians(100, echoes)
-    off = np.resize([3.0, -3.0], 100)
-    assert comparison.rmse(clean + 20 + off, echoes, baseline=20) == pytest.approx(3)
-
-
 def test_figure_is_drawn_with_and_without_echoes(tmp_path: Path) -> None:
     made, config = stimulus.reference_set(0), golden.Config()
     samples, length = made.samples.copy(), made.length

@@ -10,9 +10,6 @@ from openecho import stimulus
 from openecho.golden import NOISE_SAMPLES, Config
 from tb.env.coverage import Samples
 
-QUIET = NOISE_SAMPLES + 14
-"""Samples without an echo that go before those with many, so that the noise is measured on noise."""
-
 
 def sensitive(config: Config) -> Config:
     """The same parameters with settings under which every component is an echo, however low."""
@@ -34,32 +31,15 @@ def every_shape(config: Config, rng: np.random.Generator) -> list[Samples]:
     list of integer arrays
         In an order that has waveforms of very different lengths next to each other.
     """
-    shapes = dict(stimulus.directed(config.sample_w, _typical(config), config.tap_count, int(rng.integers(1 << 31))))
-    full = (1 << config.sample_w) - 1
-    noise = rng.normal(full / 32, max(full / 1000, 1), _typical(config))
-    return [
-        *shapes.values(),
-        stimulus.quantise(noise, config.sample_w),
-        *with_many_echoes(config, rng),
-        *every_length(config, rng),
-    ]
+    return [*_directed(config, rng).values(), *with_many_echoes(config, rng), *every_length(config, rng)]
 
 
 def with_many_echoes(config: Config, rng: np.random.Generator) -> list[Samples]:
     """Waveforms with 1 to 17 echoes, echoes that an edge cuts, and random samples with as many components as can be."""
-    length, full = _typical(config), (1 << config.sample_w) - 1
-    seed = int(rng.integers(1 << 31))
-    shapes = dict(stimulus.directed(config.sample_w, length, config.tap_count, seed))
-    shorter = dict(stimulus.directed(config.sample_w, length - QUIET, config.tap_count, seed))
-    echoes = [
-        np.concatenate([shapes["noise"][:QUIET], samples])
-        for name, samples in shorter.items()
-        if name.startswith("echoes")
-    ]
-    # The filter must lie inside the waveform, so the echo that an edge cuts stands half its length from there.
-    middle, wide = length // 2, shapes["saturated"]
-    cut = [wide[middle - config.delay :], wide[: middle + config.delay]]
-    return [*echoes, *cut, *(rng.integers(0, full, 200, endpoint=True) for _ in range(2))]
+    shapes = _directed(config, rng)
+    full = (1 << config.sample_w) - 1
+    anything = [rng.integers(0, full, 200, endpoint=True) for _ in range(2)]
+    return [*(samples for name, samples in shapes.items() if name.startswith(("echoes", "cut"))), *anything]
 
 
 def every_length(config: Config, rng: np.random.Generator) -> list[Samples]:
@@ -73,5 +53,6 @@ def every_length(config: Config, rng: np.random.Generator) -> list[Samples]:
     return [stimulus.quantise(slow, config.sample_w)[:length] for length in lengths]
 
 
-def _typical(config: Config) -> int:
-    return min(1024, config.max_samples)
+def _directed(config: Config, rng: np.random.Generator) -> dict[str, Samples]:
+    length = min(1024, config.max_samples)
+    return dict(stimulus.directed(config.sample_w, length, config.tap_count, int(rng.integers(1 << 31))))

@@ -7,33 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from openecho import golden, stimulus
+from openecho import golden
 
 QUANTITIES = ("centre", "peak", "width", "time", "amplitude")
 """What is compared of each echo; bins, and counts for the amplitude."""
-
-
-def rmse(samples: NDArray[Any], echoes: np.ndarray, baseline: float) -> float:
-    """Root mean square difference between a waveform and the Gaussians found in it: Zhou 2022, Eq (12).
-
-    The width is the published one, of the filtered echo, so the misfit shows how much the filter widens an echo.
-
-    Parameters
-    ----------
-    samples : integer (m,)
-        Raw waveform, counts.
-    echoes : structured (echoes,)
-        `centre`, `width` (bins) and `amplitude` (counts).
-    baseline : float
-        Noise mean, counts.
-
-    Returns
-    -------
-    float
-        Counts.
-    """
-    fitted = baseline + stimulus.gaussians(len(samples), echoes)
-    return float(np.sqrt(np.mean((samples - fitted) ** 2)))
 
 
 def compare(records: np.ndarray, samples: NDArray[Any], length: NDArray[Any], config: golden.Config) -> dict[str, Any]:
@@ -53,34 +30,45 @@ def compare(records: np.ndarray, samples: NDArray[Any], length: NDArray[Any], co
     Returns
     -------
     dict
-        ``waveforms``: for each its ``length``, the ``core`` and ``float64`` echoes and ``rmse``.
+        ``waveforms``: for each its ``length``, the ``core`` and ``float64`` echoes and ``rmse``: Zhou 2022, Eq (12),
+        with the published width, that of the filtered echo, so that the misfit shows how much the filter widens it.
         ``differing_waveforms``: how many have another number of echoes in float64 than in the core.
         ``largest_difference``: of each of `QUANTITIES` and of ``rmse`` over the others.
     """
-    reference = golden.float64.decompose(samples, length, config)
-    trailers = records[records["trailer"]]
+    sides = {"core": _decomposed(records), "float64": golden.float64.decompose(samples, length, config)}
+    fits = {side: golden.float64.rmse(samples, length, echoes) for side, echoes in sides.items()}
     waveforms, differing = [], 0
     largest = dict.fromkeys((*QUANTITIES, "rmse"), 0.0)
     for row, count in enumerate(length):
-        ours = records[~records["trailer"] & (records["sequence"] == row)]
-        theirs = {name: reference[name][reference["waveform"] == row] for name in QUANTITIES}
-        baselines = {"core": trailers["noise_mean"][row], "float64": reference["noise_mean"][row]}
-        fits = {"core": ours, "float64": theirs}
-        errors = {name: rmse(samples[row, :count], echoes, baselines[name]) for name, echoes in fits.items()}
-        if len(ours) == len(theirs["centre"]):
-            for name in QUANTITIES:
-                worst = np.max(np.abs(ours[name] - theirs[name]), initial=0.0)
-                largest[name] = max(largest[name], float(worst))
-            largest["rmse"] = max(largest["rmse"], abs(errors["core"] - errors["float64"]))
+        echoes = {side: _of_waveform(columns, row) for side, columns in sides.items()}
+        ours, theirs = echoes.values()
+        rmse = {side: float(fit[row]) for side, fit in fits.items()}
+        if len(ours["centre"]) == len(theirs["centre"]):
+            differences = {name: np.max(np.abs(ours[name] - theirs[name]), initial=0.0) for name in QUANTITIES}
+            differences["rmse"] = abs(rmse["core"] - rmse["float64"])
+            largest = {name: max(value, float(differences[name])) for name, value in largest.items()}
         else:
             differing += 1
         waveforms.append(
-            {"length": int(count), "rmse": errors} | {name: _rows(echoes) for name, echoes in fits.items()}
+            {"length": int(count), "rmse": rmse} | {side: _rows(columns) for side, columns in echoes.items()}
         )
     return {"waveforms": waveforms, "differing_waveforms": differing, "largest_difference": largest}
 
 
-def _rows(echoes: Any) -> list[dict[str, float]]:
+def _decomposed(records: np.ndarray) -> dict[str, NDArray[Any]]:
+    """Decoded records as the arrays that `golden.float64.decompose` returns."""
+    echoes, trailers = records[~records["trailer"]], records[records["trailer"]]
+    columns = {name: echoes[name] for name in QUANTITIES}
+    return columns | {"waveform": echoes["sequence"], "noise_mean": trailers["noise_mean"]}
+
+
+def _of_waveform(columns: dict[str, NDArray[Any]], row: int) -> dict[str, NDArray[Any]]:
+    """What is compared of the echoes of one waveform."""
+    return {name: columns[name][columns["waveform"] == row] for name in QUANTITIES}
+
+
+def _rows(columns: dict[str, NDArray[Any]]) -> list[dict[str, float]]:
     """Columns of echoes as one dict an echo."""
-    columns = (np.asarray(echoes[name], float).tolist() for name in QUANTITIES)
-    return [dict(zip(QUANTITIES, values, strict=True)) for values in zip(*columns, strict=True)]
+    return [
+        dict(zip(columns, values, strict=True)) for values in zip(*(c.tolist() for c in columns.values()), strict=True)
+    ]

@@ -1,0 +1,78 @@
+"""The core on recorded waveforms, against floating point, and against the limit of what noise lets one know."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from openecho import formats, golden, stimulus
+from openecho.golden import Config
+from openecho.study import comparison, precision
+from tb.env import runner
+from tb.env.run import Run
+
+RECORDED = ("gedi_cerrado.npz", "lvis_arctic.npz", "neon_harvard.npz")
+SLICE = 50
+"""Waveforms of each recorded file, evenly spread over it; `make sim MODULE=core DATA=` takes them all."""
+
+LIMITS = {"centre": 2**-15, "peak": 2**-15, "width": 2**-15, "time": 2**-14, "amplitude": 2**-6}
+"""Largest difference from float64 at FRAC 16, in bins and counts."""
+
+RTL_POINTS = tuple(
+    point for point in precision.POINTS if point.matched and (point.width, point.amplitude) in ((3, 200), (8, 20))
+)
+RTL_COUNT = 1000
+
+
+def decomposed(
+    samples: NDArray[Any], length: NDArray[Any], config: Config, directory: Path
+) -> tuple[np.ndarray, dict[str, Any]]:
+    """Run waveforms through the RTL, which must equal its model; return the decoded records and what was measured."""
+    stored, result = directory / "waveforms.npz", directory / "result.json"
+    np.savez(stored, samples=samples, length=length)
+    run = Run("core", config, samples=str(stored), result=str(result), progress=str(directory / "progress"))
+    runner.simulate(run, "verilator", directory, ["tb.env.reference"])
+    records = golden.decode_records(np.load(result.with_suffix(".npy")), config)
+    return records, json.loads(result.read_text())
+
+
+@pytest.mark.parametrize("name", RECORDED)
+def test_core_equals_its_model_on_recorded_waveforms_without_a_bubble(name: str, tmp_path: Path) -> None:
+    folder = os.environ.get("OPENECHO_DATA")
+    if folder is None:
+        assert "CI" not in os.environ, "CI: OPENECHO_DATA is not set, expected the folder of recorded waveforms"
+        pytest.skip("OPENECHO_DATA names no folder with recorded waveforms")
+    config = Config()
+    waveforms = formats.load(Path(folder) / name, config.sample_w)
+    rows = np.linspace(0, len(waveforms.length) - 1, SLICE).astype(int)
+    records, measured = decomposed(waveforms.samples[rows], waveforms.length[rows], config, tmp_path)
+    assert measured["mismatches"] == 0
+    assert measured["waveforms"] == records["trailer"].sum() == SLICE
+    assert measured["cycles_per_waveform"] == measured["samples_per_waveform"]
+
+
+def test_core_agrees_with_float64_on_the_reference_waveforms(tmp_path: Path) -> None:
+    made, config = stimulus.reference_set(0), Config()
+    records, measured = decomposed(made.samples, made.length, config, tmp_path)
+    assert measured["cycles_per_waveform"] == measured["samples_per_waveform"]
+    assert measured["latency_cycles"]["max"] <= 128
+    compared = comparison.compare(records, made.samples, made.length, config)
+    assert compared["differing_waveforms"] == 0
+    over = {name: compared["largest_difference"][name] for name in LIMITS}
+    assert all(over[name] <= limit for name, limit in LIMITS.items()), over
+
+
+@pytest.mark.parametrize("point", RTL_POINTS, ids=lambda point: f"sigma{point.width}-amplitude{point.amplitude}")
+def test_matched_taps_come_close_to_the_cramer_rao_bound(point: precision.Point, tmp_path: Path) -> None:
+    made = precision.waveforms(point, RTL_COUNT, seed=0)
+    records, _ = decomposed(made.samples, made.length, point.config, tmp_path)
+    score = precision.score(point, records, made.truth)
+    assert score["found"] == RTL_COUNT
+    assert score["peak"] <= 1.1
+    assert score["centre"] <= 1.6
