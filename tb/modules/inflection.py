@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import repeat
 from math import floor
 
 import numpy as np
@@ -10,6 +11,7 @@ import pyuvm
 from openecho import golden
 from openecho.golden import Beats, Config
 from tb.env.bench import ModuleTest
+from tb.env.waveforms import sensitive
 from tb.modules import second_difference
 
 
@@ -48,3 +50,16 @@ class WorkedExampleOfThePaper(ModuleTest):
             assert abs(found - bin_before - crossing) <= 2 / (1 << config.frac) + 20 / scale, f"{port} is {found}"
             if config.frac >= 20 and config.second_w >= 24:
                 assert floor(found * 1e5) / 1e5 == {"left": 536.99613, "right": 570.49862}[port]
+
+
+@pyuvm.test()
+class FullQueueStopsTheInput(ModuleTest):
+    """Components that come much faster than they are taken: the input waits, and not one is lost."""
+
+    async def scenario(self) -> None:
+        """Play square waves of a few periods with an output that is taken once in a hundred cycles."""
+        config, full = sensitive(self.config), (1 << self.config.sample_w) - 1
+        waveforms = [np.where(np.arange(500) % period < period // 2, full, 0) for period in (8, 14)]
+        await self.play("slow sink", waveforms, config=config, stalls={"m": repeat((1, 100))})
+        source = self.bench.scoreboard.source
+        assert source.stalls > 0, "the input never waited: the queue was not full"

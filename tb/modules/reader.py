@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import repeat
+
 import pyuvm
 
 from openecho.golden import NOISE_SAMPLES, Beats, Config
@@ -49,3 +51,15 @@ class StalledNoiseLosesNothing(_ManyShortWaveforms):
         for stalled in ("noise", "m"):
             stalls = {stalled: random_pauses(self.random, 1, 200 if stalled == "noise" else 20)}
             await self.play(f"{stalled} stalled", self.waveforms(40), stalls=stalls)
+
+
+@pyuvm.test()
+class ManyShortWaveformsWaitForTheirTurn(_ManyShortWaveforms):
+    """Behind one waveform with statistics more short ones wait, without, than the reader can remember."""
+
+    async def scenario(self) -> None:
+        """Take the noise so rarely that all of them have come before the first is taken."""
+        full = (1 << self.config.sample_w) - 1
+        lengths = [NOISE_SAMPLES, *[5] * 40]
+        waveforms = [self.rng.integers(0, full, length, endpoint=True) for length in lengths]
+        await self.play("late noise", waveforms, stalls={"noise": repeat((1, sum(lengths)))})
