@@ -15,7 +15,7 @@ RUN    := $(VENV)/bin/python
 SIM_FLAGS := $(if $(MODULE),--module '$(MODULE)') $(if $(SIM),--sim '$(SIM)') $(if $(DATA),--data '$(DATA)') \
              $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(WAVES)),--waves)
 
-.PHONY: help sim test lint format mutate precision readme clean
+.PHONY: help sim test vectors lint format mutate precision readme clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -25,6 +25,9 @@ sim: $(READY) ## simulate every module against its model [MODULE=] [SIM=verilato
 
 test: $(READY) ## run all tests: the model's and the RTL's, on every simulator found
 	@$(RUN) -m pytest -n auto
+
+vectors: $(READY) ## stream a million vectors through every float unit, where `make test` takes 50,000
+	@OPENECHO_FLOAT_VECTORS=1000000 $(RUN) -m pytest -n auto tb/float
 
 lint: $(READY) ## ruff, mypy, and Verilator and Verible on the RTL
 	@$(RUN) scripts/lint.py

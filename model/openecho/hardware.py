@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from openecho import golden
 from openecho.golden import Beats, Config
+from openecho.golden.floating import Format
 
 ROOT = Path(__file__).resolve().parents[2]
 """The repository."""
@@ -59,7 +61,7 @@ class Module:
         verified inside the modules that use it.
     latency : dict of str to callable
         For an output's prefix, the cycles from the transfer of the beat that determines an output beat to the transfer
-        of that beat, in an idle module whose sink is ready.
+        of that beat, in an idle module whose sink is ready: a function of the `Config`, or of the `FloatUnit`.
     """
 
     name: str
@@ -68,7 +70,7 @@ class Module:
     outputs: tuple[Stream, ...] = ()
     settings: tuple[str, ...] = ()
     golden: Callable[..., Beats | tuple[Beats, ...]] | None = None
-    latency: dict[str, Callable[[Config], int]] | None = None
+    latency: dict[str, Callable[[Any], int]] | None = None
 
     @property
     def top(self) -> str:
@@ -83,7 +85,7 @@ class Module:
     @property
     def sources(self) -> tuple[Path, ...]:
         """Files in the order of compilation: the package, what the module uses, the module."""
-        return (PACKAGE, *_sources(RTL / f"{self.top}.sv"))
+        return (PACKAGE, *_sources(_file(self.top)))
 
     @property
     def takes_samples(self) -> bool:
@@ -99,6 +101,22 @@ class Module:
         return {stream.prefix: beats for stream, beats in zip(self.outputs, by_output, strict=True)}
 
 
+@dataclass(frozen=True)
+class FloatUnit:
+    """A float unit as it is built.
+
+    Attributes
+    ----------
+    form : Format
+        Its parameters EXP_W and FRAC_W.
+    parameters : mapping of str to int
+        The others.
+    """
+
+    form: Format
+    parameters: Mapping[str, int] = field(default_factory=dict)
+
+
 _SAMPLES = ("sample", "index", "overlong")
 _SUMS = ("sum", "raw", "index", "overlong")
 _DIFFERENCES = ("second", "first", "raw", "index", "overlong")
@@ -108,12 +126,39 @@ _NOISE = Stream("noise", ("mean", "deviation", "none"), last=False)
 _RECORDS = Stream("m", ("record",), words=8)
 _FILTER = ("SAMPLE_W", "MAX_SAMPLES", "TAP_COUNT", "TAPS")
 _POSITIONS = ("SAMPLE_W", "FRAC", "MAX_SAMPLES")
+_FLOAT = ("EXP_W", "FRAC_W")
 _ALL = ("SAMPLE_W", "FRAC", "MAX_SAMPLES", "TAP_COUNT", "TAPS")
 
 
 def _parameters_latency(config: Config) -> int:
     """Cycles of `parameters`: 8, and the rows of its divider, whose ring each quotient passes six times."""
     return 8 + 6 * math.ceil((config.pos_w + 1) / 6)
+
+
+def _levels(width: int) -> int:
+    """Stages of a shifter that has so many places, four to choose from in each: ceil(log4(width))."""
+    return ((width - 1).bit_length() + 1) // 2
+
+
+def _add_latency(unit: FloatUnit) -> int:
+    return 7 + _levels(unit.form.frac_w + 5)
+
+
+def _mul_latency(unit: FloatUnit) -> int:
+    significand = unit.form.frac_w + 1
+    return 6 + _levels(significand) + math.ceil(significand / 17)
+
+
+def _div_latency(unit: FloatUnit) -> int:
+    """Of normal numbers with a quotient of at least 1; the header of the RTL says what else an iterative one takes."""
+    if unit.parameters["ITERATIVE"]:
+        return unit.form.frac_w + 7
+    return unit.form.frac_w + 10 + _levels(unit.form.frac_w + 1)
+
+
+def _from_int_latency(unit: FloatUnit) -> int:
+    int_w, scale = unit.parameters["INT_W"], unit.parameters["SCALE"]
+    return 4 + _levels(int_w + max(0, 1 - (int_w - 1 + scale + unit.form.bias)))
 
 
 MODULES: dict[str, Module] = {
@@ -183,6 +228,20 @@ MODULES: dict[str, Module] = {
         Module(name="divide"),
         Module(name="fifo"),
         Module(name="square_root"),
+        # IEEE-754 units, verified by tb/float, and their parts
+        Module(name="float_add", parameters=_FLOAT, latency={"m": _add_latency}),
+        Module(name="float_mul", parameters=_FLOAT, latency={"m": _mul_latency}),
+        Module(name="float_div", parameters=_FLOAT, latency={"m": _div_latency}),
+        Module(name="float_compare", parameters=_FLOAT, latency={"m": lambda _: 1}),
+        Module(name="float_from_int", parameters=_FLOAT, latency={"m": _from_int_latency}),
+        Module(name="float_to_fixed", parameters=_FLOAT, latency={"m": lambda _: 4}),
+        Module(name="float_check", parameters=_FLOAT),
+        Module(name="float_unpack", parameters=_FLOAT),
+        Module(name="float_operand", parameters=_FLOAT),
+        Module(name="float_align"),
+        Module(name="float_normalize"),
+        Module(name="float_range", parameters=_FLOAT),
+        Module(name="float_round", parameters=_FLOAT),
     )
 }
 
@@ -246,8 +305,13 @@ def package_constants() -> dict[str, int]:
     return values
 
 
+def _file(name: str) -> Path:
+    """File of a module, wherever it is in the RTL."""
+    return next(RTL.rglob(f"{name}.sv"))
+
+
 def _sources(path: Path) -> tuple[Path, ...]:
     """Files of the modules that a file instantiates, each after what it uses itself, then the file."""
     used = re.findall(r"^\s*(openecho_\w+)\s*(?:#\s*\(|u_\w+)", path.read_text(), re.MULTILINE)
-    below = (source for name in used for source in _sources(RTL / f"{name}.sv"))
+    below = (source for name in used for source in _sources(_file(name)))
     return tuple(dict.fromkeys((*below, path)))

@@ -1,0 +1,1 @@
+"""Checks the float units, streamed from the HDL side."""
