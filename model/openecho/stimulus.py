@@ -192,7 +192,7 @@ def directed(
     yield "saturated", echo(length / 2, width=10, amplitude=3 * full)
     yield "cut_start", echo(edge, width=max(4, edge))
     yield "cut_end", echo(length - 1 - edge, width=max(4, edge))
-    spacing = max(20, 6 * tap_count // 5)
+    spacing = max(20, 9 * tap_count // 8)
     for count in (1, 2, 8, 16, 17):
         if QUIET + count * spacing <= length:
             yield f"echoes_{count}", echo(*(QUIET + spacing * (0.5 + np.arange(count))))
