@@ -104,8 +104,14 @@ def differences(content: dict[str, Any]) -> list[str]:
     """Largest differences between the core and float64."""
     largest = content["largest_difference"]
     unit = dict.fromkeys(comparison.QUANTITIES, "bin") | {"amplitude": "count", "rmse": "count"}
-    rows = ((f"{name}, {unit[name]}", f"{value:.1e}") for name, value in largest.items())
-    return table(("largest difference", "core − float64"), rows)
+    rows = [(f"{name}, {unit[name]}", f"{value:.1e}") for name, value in largest.items()]
+    lost = f"{content['lost_by_five_states']} of {content['echoes']}"
+    return [
+        *table(("largest difference", "core − float64"), rows),
+        "",
+        f"Waveforms with other echoes than float64: {content['differing_waveforms']}.",
+        f"Echoes that the paper's state machine would lose, as they follow closely on another: {lost}.",
+    ]
 
 
 def echoes(content: dict[str, Any]) -> list[str]:

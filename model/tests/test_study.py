@@ -77,6 +77,8 @@ def test_core_and_float64_agree_on_the_reference_waveforms(seed: int) -> None:
     assert 0 < largest["time"] < 2**-14
     assert 0 < largest["amplitude"] < 2**-6
     assert [len(row["core"]) for row in result["waveforms"]] == np.bincount(made.truth["waveform"]).tolist()
+    assert result["echoes"] == len(made.truth)
+    assert 0 < result["lost_by_five_states"] < result["echoes"]
 
 
 def test_comparison_counts_waveforms_with_other_echoes() -> None:

@@ -34,6 +34,7 @@ def compare(records: np.ndarray, samples: NDArray[Any], length: NDArray[Any], co
         with the published width, that of the filtered echo, so that the misfit shows how much the filter widens it.
         ``differing_waveforms``: how many have another number of echoes in float64 than in the core.
         ``largest_difference``: of each of `QUANTITIES` and of ``rmse`` over the others.
+        ``echoes``, ``lost_by_five_states``: all of the core's, and those that the paper's state machine would lose.
     """
     sides = {"core": _decomposed(records), "float64": golden.float64.decompose(samples, length, config)}
     fits = {side: golden.float64.rmse(samples, length, echoes) for side, echoes in sides.items()}
@@ -52,7 +53,13 @@ def compare(records: np.ndarray, samples: NDArray[Any], length: NDArray[Any], co
         waveforms.append(
             {"length": int(count), "rmse": rmse} | {side: _rows(columns) for side, columns in echoes.items()}
         )
-    return {"waveforms": waveforms, "differing_waveforms": differing, "largest_difference": largest}
+    return {
+        "waveforms": waveforms,
+        "differing_waveforms": differing,
+        "largest_difference": largest,
+        "echoes": len(sides["core"]["waveform"]),
+        "lost_by_five_states": int(golden.float64.saved_echoes(samples, length, config).sum()),
+    }
 
 
 def _decomposed(records: np.ndarray) -> dict[str, NDArray[Any]]:
