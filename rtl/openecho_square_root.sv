@@ -20,16 +20,15 @@ module openecho_square_root #(
   logic [2*ROOT_W-1:0] radicand_q;  // the digits that are not used yet, at the top
   logic [ROOT_W-1:0] root_q;
   logic [ROOT_W-1:0] remainder_q;  // at most twice the root so far; one bit more only after the last step, unused
-  logic [ROOT_W+1:0] shifted, trial;
-  logic digit;
+  logic [ROOT_W+1:0] shifted, rest;
+  logic too_small;
 
   assign s_ready = !busy_q || (m_valid && m_ready);
   assign m_valid = busy_q && step_q == '0;
-  assign m_root  = root_q;
+  assign m_root = root_q;
 
   assign shifted = {remainder_q, radicand_q[2*ROOT_W-1-:2]};
-  assign trial   = {root_q, 2'b01};
-  assign digit   = shifted >= trial;
+  assign {too_small, rest} = {1'b0, shifted} - {1'b0, root_q, 2'b01};
 
   always_ff @(posedge clk) begin
     if (rst) begin
@@ -45,8 +44,8 @@ module openecho_square_root #(
     end else if (!m_valid) begin
       step_q <= step_q - 1'b1;
       radicand_q <= radicand_q << 2;
-      remainder_q <= ROOT_W'(digit ? shifted - trial : shifted);
-      root_q <= {root_q[ROOT_W-2:0], digit};
+      remainder_q <= ROOT_W'(too_small ? shifted : rest);
+      root_q <= {root_q[ROOT_W-2:0], !too_small};
     end
   end
 endmodule

@@ -10,7 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from openecho.golden import Config
 from openecho.hardware import ROOT
+from tb.env import runner
+from tb.env.run import Run
+
+FST_HEADER = b"\x00"
+"""Kind of the first block of an FST file."""
 
 
 def sim(*arguments: str, path: str | None = None) -> subprocess.CompletedProcess[str]:
@@ -46,3 +52,12 @@ def test_counts_wider_than_a_sample_are_refused(tmp_path: Path) -> None:
 
 def test_missing_compiler_is_refused(tmp_path: Path) -> None:
     assert_refused(sim("--sim", "verilator", path=str(tmp_path)), "g++ not found", "expected it on PATH")
+
+
+@pytest.mark.parametrize("simulator", runner.find_simulators())
+def test_waves_are_left_where_the_runner_says(simulator: str, tmp_path: Path) -> None:
+    np.savez(tmp_path / "waveforms.npz", samples=np.arange(100)[np.newaxis], length=[100])
+    stored, result, progress = (str(tmp_path / name) for name in ("waveforms.npz", "result", "progress"))
+    run = Run("output", Config(), samples=stored, result=result, progress=progress)
+    runner.simulate(run, simulator, tmp_path, ["tb.env.reference"], waves=True)
+    assert (tmp_path / runner.WAVES).read_bytes()[:1] == FST_HEADER
