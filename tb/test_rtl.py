@@ -23,6 +23,7 @@ CONFIGS = {
     "default": Config(),
     "narrow": Config(sample_w=8, frac=4, max_samples=1100, taps=(3, 11, 16, 11, 3)),
     "wide": Config(sample_w=16, frac=24, max_samples=1100, taps=STEEP + STEEP[::-1]),
+    # Taps with strong edges: the second difference is wider than the first.
     "four taps": Config(sample_w=12, frac=10, max_samples=1025, taps=(-5, 9, 9, -5)),
     "negative taps": Config(sample_w=10, max_samples=1300, taps=(*NEGATIVE, 44, *NEGATIVE[::-1]), n=1.0, k=2.5),
 }
