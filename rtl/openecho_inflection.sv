@@ -21,15 +21,14 @@
 // they share one divider. A kept run queues its operations (left, peak, right); the quotients come back in that order.
 // Rounding: half up to FRAC bits. Positions cannot overflow: they lie inside the record.
 //
-// Maximum of the raw samples strictly between the beats that bracket the run; first, highest, or clipped makes no
-// difference to its value. FLAG_SATURATED: it is full scale.
+// Maximum of the raw samples strictly between the beats that bracket the run. FLAG_SATURATED: it is full scale.
 //
 // Latency from the beat that ends a run to its component: 3 + rows of the divider cycles (21 at FRAC 16), and 1 more
 // with a peak, if the divider is idle; from the last beat of a waveform without a run in work to its trailer: 3.
 // Throughput: one beat a clock. A run takes the divider 3 * DIVIDE_LOOPS = 6 clocks and kept runs are at least
 // min_interval + 2 beats apart, so with min_interval >= 5 the input never waits for it, whatever the waveform; below
 // that, QUEUE operations take up a burst and then the input stalls. The queue also bridges the time until a waveform's
-// noise is known.
+// noise is known, for which runs 7 beats apart just fit it.
 module openecho_inflection
   import openecho_pkg::*;
 #(
