@@ -5,58 +5,51 @@
 //   mean      = S / 50                            rounded half up to AMP_FRAC bits
 //   deviation = floor(sqrt(D)) / 50               root with ROOT_FRAC bits; then rounded half up to AMP_FRAC bits
 //
-// A waveform arrives each 50 cycles at the most (shorter ones have no statistics), so the three steps after the sums,
-// D, its root and the divisions, are serial units that each take less than that and work on three waveforms at once.
-// `s_ready` falls only where the results are not taken away. Latency from the 50th sample to the result: 4 cycles for
-// the sums and COUNT_W + SUM_W, ROOT_W and QUO_W for the steps: 3 SAMPLE_W + 35 cycles, 68 at SAMPLE_W 11.
+// D grows by s (49 s - 2 S) with each sample s, S the sum before it: one multiplier and its accumulator instead of a
+// square and two products afterwards. Then, once a waveform, a digit a clock: the root's digits, highest first, go
+// into a long division by 25 as they come, and those of S into another. A step of such a division has six input bits
+// and so costs six LUTs. Division by 25 leaves the bits after the point, and the rounding, as a function of its rest.
+//
+// A waveform arrives each 50 cycles at the most (shorter ones have no statistics), and the digits take less than that.
+// `s_ready` falls only where the results are not taken away. Latency from the 50th sample to the result: 6 cycles for
+// the sums and ROOT_W for the digits: SAMPLE_W + 15 cycles, 26 at SAMPLE_W 11.
 module openecho_noise
   import openecho_pkg::*;
 #(
-    parameter int SAMPLE_W = 11
+    parameter int SAMPLE_W = 11,
+    parameter int MAX_SAMPLES = 4096
 ) (
-    input  logic                         clk,
-    input  logic                         rst,
-    input  logic                         s_valid,
-    output logic                         s_ready,
-    input  logic                         s_first,
-    input  logic                         s_last,
-    input  logic [         SAMPLE_W-1:0] s_sample,
-    output logic                         m_valid,
-    input  logic                         m_ready,
-    output logic [SAMPLE_W+AMP_FRAC-1:0] m_mean,
-    output logic [SAMPLE_W+AMP_FRAC-1:0] m_deviation,
-    output logic                         m_none
+    input  logic                           clk,
+    input  logic                           rst,
+    input  logic                           s_valid,
+    output logic                           s_ready,
+    input  logic                           s_last,
+    input  logic [           SAMPLE_W-1:0] s_sample,
+    input  logic [$clog2(MAX_SAMPLES)-1:0] s_index,
+    output logic                           m_valid,
+    input  logic                           m_ready,
+    output logic [  SAMPLE_W+AMP_FRAC-1:0] m_mean,
+    output logic [  SAMPLE_W+AMP_FRAC-1:0] m_deviation,
+    output logic                           m_none
 );
   localparam int AMP_W = SAMPLE_W + AMP_FRAC;
   localparam int COUNT_W = $clog2(NOISE_SAMPLES);
   localparam int SUM_W = SAMPLE_W + COUNT_W;
-  localparam int SQUARES_W = 2 * SAMPLE_W + COUNT_W;
-  localparam int SPREAD_W = SQUARES_W + COUNT_W;  // 50 Q
-  localparam int ROOT_W = SAMPLE_W + 5 + ROOT_FRAC;  // D <= (25 * full scale)^2, as the deviation is at most half of it
-  localparam int QUO_W = SAMPLE_W + 10;
-  localparam int NUM_W = QUO_W + COUNT_W;
-  localparam int STEP_W = $clog2(COUNT_W + SUM_W + 1);
+  localparam int FACTOR_W = SAMPLE_W + COUNT_W + 2;  // 49 s - 2 S, signed
+  localparam int SPREAD_W = 2 * (SAMPLE_W + 5);  // D <= (25 * full scale)^2, as the deviation is at most half of it
+  localparam int ROOT_W = SPREAD_W / 2 + ROOT_FRAC;
+  localparam int STEP_W = $clog2(ROOT_W + 1);
 
   // ---- which waveforms have statistics: one token each, in order ----------------------------------------------------
-  logic [COUNT_W-1:0] count_q, count;  // sample number within the waveform, until it is counted
-  logic counted_q, counted;  // the 50th sample has been seen
-  logic accept, at_limit, complete, token_push, token_ready, token_valid, token_none;
-  logic running_q, mean_pending_q;  // the waveform before still needs the sums: for D, and for the mean
+  logic accept, at_limit, in_window, complete, token_push, token_ready, token_valid, token_none;
+  logic held_q;  // D and S of a waveform wait or are at work
 
   assign accept = s_valid && s_ready;
-  assign count = s_first ? '0 : count_q;
-  assign counted = !s_first && counted_q;
-  assign at_limit = !counted && count == COUNT_W'(NOISE_SAMPLES - 1);
+  assign at_limit = 32'(s_index) == NOISE_SAMPLES - 1;
+  assign in_window = 32'(s_index) < NOISE_SAMPLES;
   assign complete = accept && at_limit;
-  assign token_push = complete || (accept && s_last && !counted);
-  assign s_ready = token_ready && !(at_limit && (running_q || mean_pending_q));
-
-  always_ff @(posedge clk) begin
-    if (accept) begin
-      count_q   <= count + 1'b1;
-      counted_q <= counted || complete;
-    end
-  end
+  assign token_push = accept && (at_limit || (s_last && in_window));
+  assign s_ready = token_ready && !(at_limit && held_q);
 
   logic [4:0] unused_token_level;
   openecho_fifo #(
@@ -67,139 +60,139 @@ module openecho_noise
       .rst,
       .s_valid(token_push),
       .s_ready(token_ready),
-      .s_data (!complete),
+      .s_data (!at_limit),
       .m_valid(token_valid),
       .m_ready(m_valid && m_ready),
       .m_data (token_none),
       .level  (unused_token_level)
   );
 
-  // ---- the sums -----------------------------------------------------------------------------------------------------
-  logic sample_valid_q, sample_first_q, sample_complete_q;
-  logic [SAMPLE_W-1:0] sample_q;
-  logic [2*SAMPLE_W-1:0] square_q;
-  logic [SUM_W-1:0] sum_q;
-  logic [SQUARES_W-1:0] squares_q;
-  logic sums_valid_q;
+  // ---- S and D; [0] has just been accepted --------------------------------------------------------------------------
+  logic [2:0] valid_q, first_q;
+  logic [3:0] complete_q;
+  logic [SAMPLE_W-1:0] sample_q, sample_q2;
+  logic [SUM_W-1:0] multiple_q, sum, sum_q, sum_held_q;
+  logic signed [FACTOR_W-1:0] factor_q;
+  logic signed [FACTOR_W+SAMPLE_W-1:0] growth_q;
+  logic [SPREAD_W-1:0] spread, spread_q, spread_held_q;
+
+  // (NOISE_SAMPLES - 1) * sample: the sample, shifted, for each 1 in the factor.
+  function automatic logic [SUM_W-1:0] times_49(input logic [SAMPLE_W-1:0] sample);
+    int b;
+    times_49 = '0;
+    for (b = 0; b < COUNT_W; b = b + 1) begin
+      if (((NOISE_SAMPLES - 1) >> b) % 2 != 0) times_49 = times_49 + (SUM_W'(sample) << b);
+    end
+  endfunction
+
+  assign sum = first_q[0] ? '0 : sum_q;
+  assign spread = first_q[2] ? '0 : spread_q;
 
   always_ff @(posedge clk) begin
-    sample_valid_q <= accept && !counted && !rst;
-    sample_first_q <= s_first;
-    sample_complete_q <= complete;
+    valid_q <= rst ? '0 : {valid_q[1:0], accept && in_window};
+    complete_q <= rst ? '0 : {complete_q[2:0], complete};
+    first_q <= {first_q[1:0], s_index == '0};
     sample_q <= s_sample;
-    square_q <= s_sample * s_sample;
-    if (sample_valid_q) begin
-      sum_q <= (sample_first_q ? '0 : sum_q) + SUM_W'(sample_q);
-      squares_q <= (sample_first_q ? '0 : squares_q) + SQUARES_W'(square_q);
-    end
-    sums_valid_q <= sample_valid_q && sample_complete_q && !rst;
+    multiple_q <= times_49(s_sample);
+    sample_q2 <= sample_q;
+    factor_q <= $signed({2'b0, multiple_q}) - $signed({1'b0, sum, 1'b0});
+    growth_q <= factor_q * $signed({1'b0, sample_q2});
+    if (valid_q[0]) sum_q <= SUM_W'(sample_q) + sum;
+    if (valid_q[2]) spread_q <= SPREAD_W'(growth_q) + spread;
+    if (complete_q[1]) sum_held_q <= sum_q;
+    if (complete_q[3]) spread_held_q <= spread_q;
   end
 
-  // ---- D = 50 Q - S^2, one bit of the multiplier a clock: first those of 50, then those of S ------------------------
-  logic spread_valid, root_ready, mean_ready;
-  logic subtract_q;
-  logic [STEP_W-1:0] step_q;
-  logic [SPREAD_W-1:0] multiplicand_q, spread_q;
-  logic [SUM_W-1:0] multiplier_q, sum_hold_q;
+  // ---- digits of the root and of both quotients ---------------------------------------------------------------------
+  localparam int DIVISOR = NOISE_SAMPLES / 2;
+  localparam int REST_W = $clog2(DIVISOR);
+  localparam int MEAN_TAIL = AMP_FRAC - 1;  // bits after those that the digits of S, or of the root, decide
+  localparam int DEVIATION_TAIL = AMP_FRAC - ROOT_FRAC - 1;
 
-  assign spread_valid = running_q && step_q == '0;
-
-  always_ff @(posedge clk) begin
-    if (rst) begin
-      running_q <= 1'b0;
-      mean_pending_q <= 1'b0;
-    end else begin
-      if (sums_valid_q) running_q <= 1'b1;
-      else if (spread_valid && root_ready) running_q <= 1'b0;
-      if (sums_valid_q) mean_pending_q <= 1'b1;
-      else if (mean_ready) mean_pending_q <= 1'b0;
+  // Tables, one for each bit `b` of a result. {rest, digit of the dividend} to {digit of the quotient, next rest}:
+  function automatic logic [2**(REST_W+1)-1:0] division_step(input int b);
+    int value, result;
+    for (value = 0; value < 2 ** (REST_W + 1); value = value + 1) begin
+      result = value < DIVISOR ? value : value - DIVISOR + 2 ** REST_W;
+      division_step[value] = 1'(result >> b);
     end
-    if (sums_valid_q) begin
-      step_q <= STEP_W'(COUNT_W + SUM_W);
-      subtract_q <= 1'b0;
-      spread_q <= '0;
-      multiplicand_q <= SPREAD_W'(squares_q);
-      multiplier_q <= SUM_W'(NOISE_SAMPLES);
-      sum_hold_q <= sum_q;
-    end else if (step_q != '0) begin
-      step_q <= step_q - 1'b1;
-      if (multiplier_q[0]) begin
-        spread_q <= subtract_q ? spread_q - multiplicand_q : spread_q + multiplicand_q;
-      end
-      multiplicand_q <= multiplicand_q << 1;
-      multiplier_q   <= multiplier_q >> 1;
-      if (step_q == STEP_W'(SUM_W + 1)) begin
-        subtract_q <= 1'b1;
-        multiplicand_q <= SPREAD_W'(sum_hold_q);
-        multiplier_q <= sum_hold_q;
-      end
-    end
-  end
+  endfunction
 
-  // ---- root and divisions -------------------------------------------------------------------------------------------
-  logic root_valid, deviation_ready, mean_valid, deviation_valid, result_ready;
-  logic [ROOT_W-1:0] root;
-  logic [QUO_W-1:0] mean_quotient, deviation_quotient;
-  logic [NUM_W-1:0] mean_numerator, deviation_numerator;
+  // The last rest to rest * 2^bits / DIVISOR, rounded half up:
+  function automatic logic [2**REST_W-1:0] division_tail(input int bits, input int b);
+    int rest, result;
+    for (rest = 0; rest < 2 ** REST_W; rest = rest + 1) begin
+      result = (rest * 2 ** bits + DIVISOR / 2) / DIVISOR;
+      division_tail[rest] = 1'(result >> b);
+    end
+  endfunction
+
+  logic busy_q, done, running, clear;
+  logic [STEP_W-1:0] step_q;  // digits to come
+  logic sum_digit, root_digit;
+  logic [1:0] pair;
+  logic [REST_W:0] mean_step, deviation_step;
+  logic [REST_W-1:0] mean_rest_q, deviation_rest_q;
+  logic [SAMPLE_W:0] mean_q;
+  logic [SAMPLE_W+ROOT_FRAC-1:0] deviation_q;
+
+  assign done = busy_q && step_q == '0;
+  assign clear = !busy_q || (done && m_ready);
+  assign running = busy_q && step_q != '0;
+  assign sum_digit = 1'({(2 ** STEP_W)'(sum_held_q), 1'b0} >> step_q);
+  assign pair = 2'({(2 ** (STEP_W + 1))'(spread_held_q), {(2 * ROOT_FRAC + 2) {1'b0}}} >> {step_q, 1'b0});
 
   openecho_square_root #(
       .ROOT_W(ROOT_W)
   ) u_root (
       .clk,
-      .rst,
-      .s_valid(spread_valid),
-      .s_ready(root_ready),
-      .s_radicand({spread_q[2*(ROOT_W-ROOT_FRAC)-1:0], {(2 * ROOT_FRAC) {1'b0}}}),
-      .m_valid(root_valid),
-      .m_ready(deviation_ready),
-      .m_root(root)
+      .clear,
+      .advance(running),
+      .pair,
+      .digit  (root_digit)
   );
 
-  // One bit below AMP_FRAC, for rounding.
-  assign mean_numerator = NUM_W'(sum_hold_q) << (AMP_FRAC + 1);
-  assign deviation_numerator = NUM_W'(root) << (AMP_FRAC + 1 - ROOT_FRAC);
+  for (genvar b = 0; b <= REST_W; b++) begin : g_step
+    localparam logic [2**(REST_W+1)-1:0] STEP = division_step(b);
+    assign mean_step[b] = STEP[{mean_rest_q, sum_digit}];
+    assign deviation_step[b] = STEP[{deviation_rest_q, root_digit}];
+  end
 
-  openecho_divide #(
-      .DEN_W (COUNT_W),
-      .QUO_W (QUO_W),
-      .STAGES(1)
-  ) u_mean (
-      .clk,
-      .rst,
-      .s_valid(mean_pending_q),
-      .s_ready(mean_ready),
-      .s_head(mean_numerator[NUM_W-1:QUO_W]),
-      .s_tail(mean_numerator[QUO_W-1:0]),
-      .s_den(COUNT_W'(NOISE_SAMPLES)),
-      .m_valid(mean_valid),
-      .m_ready(result_ready),
-      .m_quotient(mean_quotient)
-  );
+  always_ff @(posedge clk) begin
+    if (rst) begin
+      held_q <= 1'b0;
+      busy_q <= 1'b0;
+    end else begin
+      if (complete_q[3]) held_q <= 1'b1;
+      else if (running && step_q == STEP_W'(1)) held_q <= 1'b0;
+      if (done) busy_q <= !m_ready;
+      else if (held_q && token_valid && !token_none) busy_q <= 1'b1;
+    end
+    if (clear) begin
+      step_q <= STEP_W'(ROOT_W);
+      {mean_q, mean_rest_q} <= '0;
+      {deviation_q, deviation_rest_q} <= '0;
+    end else if (running) begin
+      step_q <= step_q - 1'b1;
+      {mean_q, mean_rest_q} <= {mean_q[SAMPLE_W-1:0], mean_step};
+      {deviation_q, deviation_rest_q} <= {deviation_q[SAMPLE_W+ROOT_FRAC-2:0], deviation_step};
+    end
+  end
 
-  openecho_divide #(
-      .DEN_W (COUNT_W),
-      .QUO_W (QUO_W),
-      .STAGES(1)
-  ) u_deviation (
-      .clk,
-      .rst,
-      .s_valid(root_valid),
-      .s_ready(deviation_ready),
-      .s_head(deviation_numerator[NUM_W-1:QUO_W]),
-      .s_tail(deviation_numerator[QUO_W-1:0]),
-      .s_den(COUNT_W'(NOISE_SAMPLES)),
-      .m_valid(deviation_valid),
-      .m_ready(result_ready),
-      .m_quotient(deviation_quotient)
-  );
+  logic [MEAN_TAIL-1:0] mean_tail;
+  logic [DEVIATION_TAIL:0] deviation_tail;
+  for (genvar b = 0; b < MEAN_TAIL; b++) begin : g_mean_tail
+    localparam logic [2**REST_W-1:0] TAIL = division_tail(MEAN_TAIL, b);
+    assign mean_tail[b] = TAIL[mean_rest_q];
+  end
+  for (genvar b = 0; b <= DEVIATION_TAIL; b++) begin : g_deviation_tail
+    localparam logic [2**REST_W-1:0] TAIL = division_tail(DEVIATION_TAIL, b);
+    assign deviation_tail[b] = TAIL[deviation_rest_q];
+  end
 
-  function automatic logic [AMP_W-1:0] round_half_up(input logic [QUO_W-1:0] value);
-    round_half_up = AMP_W'(value[QUO_W-1:1]) + AMP_W'(value[0]);
-  endfunction
-
-  assign m_valid = token_valid && (token_none || (mean_valid && deviation_valid));
+  // While nothing is divided all of this is zero, as it has to be beside `none`.
+  assign m_valid = token_valid && (token_none || done);
   assign m_none = token_none;
-  assign m_mean = token_none ? '0 : round_half_up(mean_quotient);
-  assign m_deviation = token_none ? '0 : round_half_up(deviation_quotient);
-  assign result_ready = m_valid && m_ready && !token_none;
+  assign m_mean = {mean_q, mean_tail};  // rounding carries no further: 24 * 2^7 / 25 < 2^7 - 1
+  assign m_deviation = {1'b0, deviation_q, DEVIATION_TAIL'(0)} + AMP_W'(deviation_tail);
 endmodule

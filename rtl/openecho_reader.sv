@@ -66,15 +66,16 @@ module openecho_reader
   end
 
   openecho_noise #(
-      .SAMPLE_W(SAMPLE_W)
+      .SAMPLE_W(SAMPLE_W),
+      .MAX_SAMPLES(MAX_SAMPLES)
   ) u_noise (
       .clk,
       .rst,
       .s_valid(s_valid && m_free && !skipping_q),
       .s_ready(noise_s_ready),
-      .s_first(index_q == '0),
       .s_last(last),
       .s_sample(s_sample),
+      .s_index(index_q),
       .m_valid(noise_valid),
       .m_ready(noise_ready),
       .m_mean(noise_mean),

@@ -1,51 +1,32 @@
-// root = floor(sqrt(radicand)), two bits of the radicand and one of the root a clock, as by hand.
+// Digits of floor(sqrt(radicand)), highest first: in each cycle with `advance` two bits of the radicand go in, also the
+// highest first, and the digit that they decide comes out at once. `clear` prepares for a new radicand.
 //
-// Latency ROOT_W cycles, one operation at a time; exact. A serial form suffices: it runs once a waveform.
+// Non-restoring: a digit of 0 leaves the remainder negative, and the next step adds where it would subtract. So a digit
+// costs one adder and no multiplexer. Exact; what remains after the last digit is not needed.
 module openecho_square_root #(
     parameter int ROOT_W = 20
 ) (
-    input  logic                clk,
-    input  logic                rst,
-    input  logic                s_valid,
-    output logic                s_ready,
-    input  logic [2*ROOT_W-1:0] s_radicand,
-    output logic                m_valid,
-    input  logic                m_ready,
-    output logic [  ROOT_W-1:0] m_root
+    input  logic       clk,
+    input  logic       clear,
+    input  logic       advance,
+    input  logic [1:0] pair,
+    output logic       digit
 );
-  localparam int STEP_W = $clog2(ROOT_W + 1);
+  logic [ROOT_W-2:0] root_q;
+  logic [ROOT_W-1:0] remainder_q;  // without its sign, which is that of the last digit
+  logic [ROOT_W+1:0] remainder;
 
-  logic busy_q;
-  logic [STEP_W-1:0] step_q;
-  logic [2*ROOT_W-1:0] radicand_q;  // the digits that are not used yet, at the top
-  logic [ROOT_W-1:0] root_q;
-  logic [ROOT_W-1:0] remainder_q;  // at most twice the root so far; one bit more only after the last step, unused
-  logic [ROOT_W+1:0] shifted, rest;
-  logic too_small;
-
-  assign s_ready = !busy_q || (m_valid && m_ready);
-  assign m_valid = busy_q && step_q == '0;
-  assign m_root = root_q;
-
-  assign shifted = {remainder_q, radicand_q[2*ROOT_W-1-:2]};
-  assign {too_small, rest} = {1'b0, shifted} - {1'b0, root_q, 2'b01};
+  // 4 remainder + pair - {root, 01} after a 1, + {root, 11} after a 0; minus is the complement plus one.
+  assign remainder = {remainder_q, pair} + {{1'b0, root_q} ^ {ROOT_W{root_q[0]}}, 2'b11};
+  assign digit = !remainder[ROOT_W+1];
 
   always_ff @(posedge clk) begin
-    if (rst) begin
-      busy_q <= 1'b0;
-    end else if (s_ready) begin
-      busy_q <= s_valid;
-    end
-    if (s_ready) begin
-      step_q <= STEP_W'(ROOT_W);
-      radicand_q <= s_radicand;
-      remainder_q <= '0;
+    if (clear) begin
       root_q <= '0;
-    end else if (!m_valid) begin
-      step_q <= step_q - 1'b1;
-      radicand_q <= radicand_q << 2;
-      remainder_q <= ROOT_W'(too_small ? shifted : rest);
-      root_q <= {root_q[ROOT_W-2:0], !too_small};
+      remainder_q <= '1;  // -1, as after a 0
+    end else if (advance) begin
+      root_q <= {root_q[ROOT_W-3:0], digit};
+      remainder_q <= remainder[ROOT_W-1:0];
     end
   end
 endmodule

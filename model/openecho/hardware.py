@@ -224,7 +224,7 @@ MODULES: dict[str, Module] = {
             latency={"m": lambda config: 1 + 4 + 2 + 3 + _parameters_latency(config)},
         ),
         Module(name="check", parameters=("SAMPLE_W", "FRAC", "MAX_SAMPLES", "TAP_COUNT")),
-        Module(name="noise", parameters=("SAMPLE_W",)),
+        Module(name="noise", parameters=("SAMPLE_W", "MAX_SAMPLES")),
         Module(name="divide"),
         Module(name="fifo"),
         Module(name="square_root"),

@@ -129,7 +129,7 @@ class Scoreboard(uvm_scoreboard):
             rows = differs.any(axis=1)
             wrong |= rows
             for row in np.flatnonzero(rows)[:SHOWN]:
-                found = ", ".join(map(str, values[row])) + " with unknown bits" * unknown[row].any()
+                found = ", ".join(map(str, values[row])) + " with unknown bits" * bool(unknown[row].any())
                 model_bits = ", ".join(map(str, _as_bits(model.data[row], bits)))
                 where = f"{title}: waveform {waveform[row]}, beat {row}, cycle {cycles[row]}"
                 self.differences.append(f"{where}: {port} is {found}, expected {model_bits}")
