@@ -8,13 +8,15 @@ a whole data set is one call::
     beats = golden.stream(samples, length, config)
     echoes = golden.decode_records(golden.core(beats, config)["record"], config)
 
-`golden.float64` is the same method in floating point, for judging the fixed point.
+The core calculates in fixed point or, if `Config.exp_w` is not 0, with IEEE-754 numbers: `arithmetic`, on the exact
+model `floating` of the float units. `float64` is the same method straight from the equations, for judging either.
 """
 
 from . import float64
 from .beats import Beats, stream
 from .config import (
     AMP_FRAC,
+    ARITHMETICS,
     NO_NOISE,
     NO_PEAK,
     NOISE_SAMPLES,
@@ -22,6 +24,7 @@ from .config import (
     RATIO_FRAC,
     ROOT_FRAC,
     SATURATED,
+    TAP_FRAC,
     TOO_LONG,
     TOO_SHORT,
     TRUNCATED,
@@ -38,6 +41,7 @@ from .second_difference import second_difference
 
 __all__ = [
     "AMP_FRAC",
+    "ARITHMETICS",
     "NOISE_SAMPLES",
     "NO_NOISE",
     "NO_PEAK",
@@ -45,6 +49,7 @@ __all__ = [
     "RATIO_FRAC",
     "ROOT_FRAC",
     "SATURATED",
+    "TAP_FRAC",
     "TOO_LONG",
     "TOO_SHORT",
     "TRUNCATED",

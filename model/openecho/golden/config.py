@@ -1,8 +1,10 @@
 """What a core is built with and set to, and every width that follows from it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+
+from .floating import BINARY16, BINARY32, BINARY64, Format
 
 NOISE_SAMPLES = 50
 """Samples at the start of a waveform that measure the noise (Zhou 2022, section 2.1)."""
@@ -12,11 +14,21 @@ ROOT_FRAC = 4
 """Fractional bits of the square root inside the noise deviation."""
 RATIO_FRAC = 4
 """Fractional bits of the settings n and k: UQ4.4."""
+TAP_FRAC = 11
+"""Fractional bits of a tap in Zhou 2022, Eq (11): the 2⁻¹¹ that scales the differences where they become floats."""
 
 SATURATED, TRUNCATED, NO_PEAK = 1, 2, 4
 """Flags of an echo."""
 TOO_SHORT, TOO_LONG, NO_NOISE = 1, 2, 4
 """Flags of a trailer."""
+
+ARITHMETICS = {
+    "fixed": (0, 16),
+    "float16": (BINARY16.exp_w, BINARY16.frac_w),
+    "float32": (BINARY32.exp_w, BINARY32.frac_w),
+    "float64": (BINARY64.exp_w, BINARY64.frac_w),
+}
+"""`exp_w` and `frac` of each arithmetic that command lines and reports know by name."""
 
 PAPER_TAPS = (43, 55, 69, 84, 99, 114, 127, 138, 146, 150, 150, 146, 138, 127, 114, 99, 84, 69, 55, 43)
 """The Gaussian of Zhou 2022, Eq (11), as the integers in front of 2⁻¹¹."""
@@ -30,8 +42,12 @@ class Config:
     ----------
     sample_w : int
         Bits of an unsigned sample, 8 to 16.
+    exp_w : int
+        Bits of the exponent. 0: positions are fixed point with `frac` fractional bits. 5 to 11: positions, widths,
+        times, amplitudes and the differences of the filtered waveform are IEEE-754 numbers with `exp_w` exponent and
+        `frac` fraction bits.
     frac : int
-        Fractional bits of a position, 4 to 24.
+        Fractional bits of a position, 4 to 24; fraction bits of an IEEE-754 number, 2 to 52.
     max_samples : int
         Longest waveform, T + 2 to 65536 samples.
     taps : tuple of int
@@ -48,10 +64,11 @@ class Config:
     Raises
     ------
     ValueError
-        If a value is outside the range given here.
+        If a value is outside the range given here, or a result could be beyond the largest number of the format.
     """
 
     sample_w: int = 11
+    exp_w: int = 0
     frac: int = 16
     max_samples: int = 4096
     taps: tuple[int, ...] = PAPER_TAPS
@@ -62,7 +79,11 @@ class Config:
 
     def __post_init__(self) -> None:
         _check_integer("sample_w", self.sample_w, 8, 16)
-        _check_integer("frac", self.frac, 4, 24)
+        if self.exp_w == 0:
+            _check_integer("frac", self.frac, 4, 24)
+        else:
+            _check_integer("exp_w", self.exp_w, 5, 11, "0 or ")
+            _check_integer("frac", self.frac, 2, 52)
         _check_integer("number of taps", len(self.taps), 4, 48)
         for tap in self.taps:
             _check_integer("tap", tap, -(1 << 15), (1 << 15) - 1)
@@ -73,6 +94,18 @@ class Config:
         _check_integer("min_amplitude", self.min_amplitude, 0, (1 << self.sample_w) - 1)
         _check_ratio("n", self.n)
         _check_ratio("k", self.k)
+        if self.form is not None:
+            self._check_range(self.form)
+
+    def in_arithmetic(self, name: str) -> "Config":
+        """Return the same core in one of `ARITHMETICS`."""
+        exp_w, frac = ARITHMETICS[name]
+        return replace(self, exp_w=exp_w, frac=frac)
+
+    @property
+    def form(self) -> Format | None:
+        """Format of the IEEE-754 numbers; None if positions are fixed point."""
+        return Format(self.exp_w, self.frac) if self.exp_w else None
 
     @property
     def tap_count(self) -> int:
@@ -101,12 +134,12 @@ class Config:
 
     @property
     def pos_w(self) -> int:
-        """Bits of a position."""
-        return self.idx_w + self.frac
+        """Bits of a position, or of any IEEE-754 number."""
+        return self.idx_w + self.frac if self.form is None else self.form.word_w
 
     @property
     def amp_w(self) -> int:
-        """Bits of an amplitude."""
+        """Bits of an amplitude, a noise mean or a noise deviation in fixed point."""
         return self.sample_w + AMP_FRAC
 
     @property
@@ -116,18 +149,28 @@ class Config:
 
     @property
     def first_w(self) -> int:
-        """Bits of the signed first difference."""
+        """Bits of the signed first difference as an integer."""
         return self._signed_width(1)
 
     @property
     def second_w(self) -> int:
-        """Bits of the signed second difference."""
+        """Bits of the signed second difference as an integer."""
         return self._signed_width(2)
 
     @property
+    def difference_w(self) -> int:
+        """Bits of either signed difference as an integer."""
+        return max(self.first_w, self.second_w)
+
+    @property
+    def value_w(self) -> int:
+        """Bits of a record's widest field: a position, the echo time with its sign, an amplitude or a length."""
+        return max(self.pos_w + (self.form is None), self.amp_w, self.len_w)
+
+    @property
     def word_w(self) -> int:
-        """Bits of a record's word: the narrower of 32 and 64 that holds the signed echo time and the amplitude."""
-        return 32 if max(self.pos_w + 1, self.amp_w) <= 32 else 64
+        """Bits of a record's word: the narrower of 32 and 64 that holds every field."""
+        return 32 if self.value_w <= 32 else 64
 
     @property
     def n_raw(self) -> int:
@@ -147,10 +190,24 @@ class Config:
         gain = max(int(taps[taps > 0].sum()), -int(taps[taps < 0].sum()))
         return self.sample_w + gain.bit_length() + 1
 
+    def _check_range(self, form: Format) -> None:
+        """Refuse a format in which a result could overflow: 2^bias is a number, twice as much is not."""
+        greatest = {
+            "the sum of two positions": self.idx_w + 1,
+            "an amplitude": self.sample_w,
+            "the sum of two differences": self.difference_w - TAP_FRAC,
+        }
+        for what, power in greatest.items():
+            if power > form.bias:
+                raise ValueError(
+                    f"exp_w: found {self.exp_w}, whose numbers end at 2^{form.bias + 1}, "
+                    f"expected more bits for {what} of up to 2^{power}"
+                )
 
-def _check_integer(name: str, value: int, low: int, high: int) -> None:
+
+def _check_integer(name: str, value: int, low: int, high: int, other: str = "") -> None:
     if not isinstance(value, int | np.integer) or not low <= value <= high:
-        raise ValueError(f"{name}: found {value!r}, expected an integer from {low} to {high}")
+        raise ValueError(f"{name}: found {value!r}, expected {other}an integer from {low} to {high}")
 
 
 def _check_ratio(name: str, value: float) -> None:

@@ -1,11 +1,11 @@
-"""The whole method in float64, straight from the equations: what the fixed-point core is judged against."""
+"""The whole method in float64, straight from the equations: what the core is judged against."""
 
 from collections.abc import Mapping
 
 import numpy as np
 
 from .beats import Array, Beats, BoolArray, FloatArray, IntArray, stream, waveform_of
-from .config import NO_PEAK, NOISE_SAMPLES, SATURATED, TRUNCATED, Config
+from .config import NO_PEAK, NOISE_SAMPLES, SATURATED, TAP_FRAC, TRUNCATED, Config
 from .inflection import falls_in_runs, maxima, not_positive_runs, raw_end
 from .reader import reader
 
@@ -44,7 +44,7 @@ def decompose(samples: Array, length: Array, config: Config, published: bool = F
     mean, deviation = _noise(sample, np.flatnonzero(index == 0), noise["none"] == 0)
 
     # Differences are used only where the filter lies inside the waveform: what comes before its start does not matter.
-    filtered = np.convolve(sample, np.array(config.taps) / 2**11)[: sample.size]
+    filtered = np.convolve(sample, np.array(config.taps) / 2**TAP_FRAC)[: sample.size]
     first = np.diff(filtered, prepend=0)
     second = np.diff(first, prepend=0)
 

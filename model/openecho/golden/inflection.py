@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from .arithmetic import add, div, from_int, magnitude
 from .beats import Array, Beats, BoolArray, IntArray, interleave
 from .config import NO_PEAK, SATURATED, TOO_LONG, TOO_SHORT, TRUNCATED, Config
 from .rounding import divide
@@ -27,8 +28,9 @@ def inflection(beats: Beats, config: Config) -> Beats:
     Returns
     -------
     Beats
-        Components in order, then a trailer (`last`), for each waveform. `left`, `right`, `peak`: bins with `frac`
-        fractional bits, 0 at the first raw sample; `maximum`: counts; `length`: samples, on trailers; `flags`.
+        Components in order, then a trailer (`last`), for each waveform. `left`, `right`, `peak`: bins, 0 at the first
+        raw sample, with `frac` fractional bits or as floats; `maximum`: counts; `length`: samples, on trailers;
+        `flags`.
     """
     index, second, first = beats["index"], beats["second"], beats["first"]
     begin, end = not_positive_runs(second, index, config)
@@ -98,14 +100,25 @@ def maxima(raw: IntArray, begin: IntArray, end: IntArray) -> IntArray:
 
 
 def _position(index: IntArray, delay: int, config: Config) -> IntArray:
-    """Raw bin, in fixed point, of the difference at a beat: `delay` half bins earlier."""
-    return (index << config.frac) - (delay << (config.frac - 1))
+    """Raw bin of the difference at a beat: `delay` half bins earlier. Rounded once if it is a float."""
+    half_bins = 2 * index - delay
+    if config.form is None:
+        return half_bins << (config.frac - 1)
+    return from_int(half_bins, config.form, -1)
 
 
 def _zero(values: IntArray, before: IntArray, index: IntArray, delay: int, config: Config) -> IntArray:
-    """Raw bin, in fixed point, where the line from each beat `before` to the next crosses zero: Eq (4), Eq (5)."""
-    value, next_value = abs(values[before]), abs(values[before + 1])
-    return _position(index[before], delay, config) + divide(value, value + next_value, config.frac)
+    """Raw bin where the line from each beat `before` to the next crosses zero: Eq (4), Eq (5).
+
+    In fixed point the fraction of a bin is rounded half up; as floats sum, quotient and sum are rounded one by one.
+    """
+    position = _position(index[before], delay, config)
+    value, next_value = values[before], values[before + 1]
+    form = config.form
+    if form is None:
+        return position + divide(abs(value), abs(value) + abs(next_value), config.frac)
+    value, next_value = magnitude(value, form), magnitude(next_value, form)
+    return add(position, div(value, add(value, next_value, form), form), form)
 
 
 def _last_of_each(waveform: IntArray, waveforms: int) -> BoolArray:

@@ -23,9 +23,11 @@ def output(beats: Beats, config: Config) -> Beats:
     3    centre                       length
     4    peak                         noise mean
     5    width                        0
-    6    time, sign-extended          0
+    6    time                         0
     7    amplitude                    noise deviation
     ==== ============================ ============================
+
+    The time, and every float, is sign-extended to a word.
 
     Parameters
     ----------

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from .beats import Array
+from .arithmetic import decode
+from .beats import Array, FloatArray
 from .config import AMP_FRAC, Config
 from .output import FLAGS_MASK, TRAILER_BIT
 
@@ -47,12 +48,18 @@ def decode_records(records: Array, config: Config) -> Array:
     decoded["flags"] = words[:, 0] & FLAGS_MASK
     decoded["sequence"] = words[:, 1]
     decoded["number"] = words[:, 2]
-    bins = words.astype(f"i{config.word_w // 8}") / (1 << config.frac)
+    for word, name in enumerate(("centre", "peak", "width", "time", "amplitude"), start=3):
+        decoded[name] = np.where(trailer, np.nan, _number(words[:, word], name, config))
     counts = words / (1 << AMP_FRAC)
-    for word, name in enumerate(("centre", "peak", "width", "time"), start=3):
-        decoded[name] = np.where(trailer, np.nan, bins[:, word])
-    decoded["amplitude"] = np.where(trailer, np.nan, counts[:, 7])
     decoded["length"] = np.where(trailer, words[:, 3], 0)
     decoded["noise_mean"] = np.where(trailer, counts[:, 4], np.nan)
     decoded["noise_deviation"] = np.where(trailer, counts[:, 7], np.nan)
     return decoded
+
+
+def _number(words: Array, name: str, config: Config) -> FloatArray:
+    """Bins or counts that a field of an echo stands for."""
+    signed = words.astype(f"i{config.word_w // 8}").astype(np.int64)
+    if config.form is None:
+        return signed / (1 << (AMP_FRAC if name == "amplitude" else config.frac))
+    return decode(signed, config.form)

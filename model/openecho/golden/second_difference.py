@@ -2,21 +2,23 @@
 
 import numpy as np
 
+from .arithmetic import from_int
 from .beats import Beats, IntArray
-from .config import Config
+from .config import TAP_FRAC, Config
 
 
 def second_difference(beats: Beats, config: Config) -> Beats:
     """First and second backward difference of the filtered waveform, taken as 0 before its start.
 
-    Zhou 2022, Eq (2), with its newest sample y[x+2] as the current one.
+    Zhou 2022, Eq (2), with its newest sample y[x+2] as the current one. In fixed point both are exact and, as the sum,
+    without the 2⁻¹¹ of Eq (11). As floats they have it, so that they stay in the range of binary16: integers,
+    converted and scaled in one rounding, which leaves no difference but 0 without its sign.
 
     Parameters
     ----------
     beats : Beats
         `sum`, `raw`, `index`, `overlong`, `last`.
     config : Config
-        Not used; every module is called alike.
 
     Returns
     -------
@@ -25,9 +27,10 @@ def second_difference(beats: Beats, config: Config) -> Beats:
     """
     starts = np.flatnonzero(beats["index"] == 0)
     first = _difference(beats["sum"], starts)
+    second = _difference(first, starts)
     return {
-        "second": _difference(first, starts),
-        "first": first,
+        "second": second if config.form is None else from_int(second, config.form, -TAP_FRAC),
+        "first": first if config.form is None else from_int(first, config.form, -TAP_FRAC),
         "raw": beats["raw"],
         "index": beats["index"],
         "overlong": beats["overlong"],
