@@ -141,24 +141,35 @@ def _levels(width: int) -> int:
 
 
 def _add_latency(unit: FloatUnit) -> int:
-    return 7 + _levels(unit.form.frac_w + 5)
+    """If iterative, of a sum with a carry and nothing to align; the header of the RTL says what others take."""
+    if unit.parameters.get("ITERATIVE"):
+        return 4
+    return 6 + _levels(unit.form.frac_w + 5)
 
 
 def _mul_latency(unit: FloatUnit) -> int:
     significand = unit.form.frac_w + 1
-    return 6 + _levels(significand) + math.ceil(significand / 17)
+    return 5 + _levels(significand) + math.ceil(significand / 17)
 
 
 def _div_latency(unit: FloatUnit) -> int:
-    """Of normal numbers with a quotient of at least 1; the header of the RTL says what else an iterative one takes."""
+    """If iterative, of normal numbers with a quotient of at least 1; the header of the RTL says what others take."""
     if unit.parameters["ITERATIVE"]:
-        return unit.form.frac_w + 7
-    return unit.form.frac_w + 10 + _levels(unit.form.frac_w + 1)
+        return _serial_latency(unit)
+    return unit.form.frac_w + 9 + _levels(unit.form.frac_w + 1)
+
+
+def _serial_latency(unit: FloatUnit) -> int:
+    """Of a division, as above; sums take as long as in an iterative adder."""
+    return unit.form.frac_w + 6
 
 
 def _from_int_latency(unit: FloatUnit) -> int:
+    """If iterative, of the most negative integer; the header of the RTL says what others take."""
+    if unit.parameters.get("ITERATIVE"):
+        return 3
     int_w, scale = unit.parameters["INT_W"], unit.parameters["SCALE"]
-    return 4 + _levels(int_w + max(0, 1 - (int_w - 1 + scale + unit.form.bias)))
+    return 3 + _levels(int_w + max(0, 1 - (int_w - 1 + scale + unit.form.bias)))
 
 
 MODULES: dict[str, Module] = {
@@ -232,6 +243,7 @@ MODULES: dict[str, Module] = {
         Module(name="float_add", parameters=_FLOAT, latency={"m": _add_latency}),
         Module(name="float_mul", parameters=_FLOAT, latency={"m": _mul_latency}),
         Module(name="float_div", parameters=_FLOAT, latency={"m": _div_latency}),
+        Module(name="float_serial", parameters=_FLOAT, latency={"m": _serial_latency}),
         Module(name="float_compare", parameters=_FLOAT, latency={"m": lambda _: 1}),
         Module(name="float_from_int", parameters=_FLOAT, latency={"m": _from_int_latency}),
         Module(name="float_to_fixed", parameters=_FLOAT, latency={"m": lambda _: 4}),

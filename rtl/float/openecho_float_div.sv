@@ -2,15 +2,10 @@
 // 0/0, infinity/infinity and signalling NaNs are invalid; any other finite number by zero is an infinity with
 // divide_by_zero. Flags and their order: openecho_float_round. Both forms below give the same bits.
 //
-// ITERATIVE 1: one quotient bit a clock, one division at a time besides the one that is being rounded. Latency FRAC_W +
-// 8 cycles, one less if |significand of s_a| >= |significand of s_b|; a subnormal operand adds a cycle for each leading
-// zero, a subnormal result takes one off for each, NaN, infinity and zero take 4 cycles. A new division each latency -
-// 3 cycles. A subnormal divisor is normalised by the same registers, bit by bit; a subnormal dividend just makes
-// leading zeros in the quotient. The exponent counts down with the quotient bits and division ends at the leading one's
-// last place or at the smallest exponent, whichever comes first: quotient, remainder and exponent are then ready to be
-// rounded, subnormal or not, without any shifter. Restoring, as the multiplexer that restores also loads the dividend.
+// ITERATIVE 1: a quotient bit a clock, one division at a time. Latency FRAC_W + 6 cycles for normal numbers with a
+// quotient of at least 1, a new division each FRAC_W + 5; for others see openecho_float_serial, which does it.
 //
-// ITERATIVE 0: a row for each quotient bit, one result a clock. Latency 10 + FRAC_W + ceil(log4(FRAC_W + 1)) cycles.
+// ITERATIVE 0: a row for each quotient bit, one result a clock. Latency 9 + FRAC_W + ceil(log4(FRAC_W + 1)) cycles.
 // Non-restoring, as a row then is one adder; the sign of the last remainder is put right at the end.
 module openecho_float_div #(
     parameter int EXP_W = 11,
@@ -29,123 +24,45 @@ module openecho_float_div #(
     output logic [WORD_W-1:0] m_result,
     output logic [       4:0] m_flags
 );
-  localparam int SIG_W = FRAC_W + 1;
-  localparam int BIAS = (1 << (EXP_W - 1)) - 1;
-  // Differences of exponents, from 1 - FRAC_W for the smallest subnormal, plus the bias and the quotient bits to come.
-  localparam int EXPONENT_W = $clog2((3 << (EXP_W - 1)) + 2 * FRAC_W + 4) + 1;
-
-  openecho_float_check #(
-      .EXP_W (EXP_W),
-      .FRAC_W(FRAC_W)
-  ) u_check ();
-
-  logic advance;
-  assign advance = !m_valid || m_ready;
-
-  // {sign, nan, infinite, invalid, divide_by_zero} of the quotient.
-  logic a_sign, a_zero, a_infinite, a_nan, a_signalling;
-  logic b_sign, b_zero, b_infinite, b_nan, b_signalling;
-  logic clash, zero;
-  logic [4:0] kind;
-  assign clash = (a_infinite && b_infinite) || (a_zero && b_zero);
-  assign zero = a_zero || b_infinite;
-  assign kind = {
-    a_sign ^ b_sign,
-    a_nan || b_nan || clash,
-    a_infinite || b_zero,
-    a_signalling || b_signalling || clash,
-    b_zero && !a_zero && !a_infinite && !a_nan
-  };
-
   if (ITERATIVE) begin : g_iterative
-    localparam int QUO_W = SIG_W + 2;  // guard and round below the fraction
-
-    logic [EXP_W-1:0] a_exponent, b_exponent;
-    logic [SIG_W-1:0] a_significand, b_significand;
-
-    openecho_float_unpack #(
+    openecho_float_serial #(
         .EXP_W (EXP_W),
         .FRAC_W(FRAC_W)
-    ) u_a (
-        .word(s_a),
-        .sign(a_sign),
-        .exponent(a_exponent),
-        .significand(a_significand),
-        .zero(a_zero),
-        .infinite(a_infinite),
-        .nan(a_nan),
-        .signalling(a_signalling)
-    );
-
-    openecho_float_unpack #(
-        .EXP_W (EXP_W),
-        .FRAC_W(FRAC_W)
-    ) u_b (
-        .word(s_b),
-        .sign(b_sign),
-        .exponent(b_exponent),
-        .significand(b_significand),
-        .zero(b_zero),
-        .infinite(b_infinite),
-        .nan(b_nan),
-        .signalling(b_signalling)
-    );
-
-    logic busy_q, exact_q, solved, normal, fits;
-    logic [4:0] kind_q;
-    logic signed [EXPONENT_W-1:0] exponent_q;
-    logic [SIG_W-1:0] den_q, difference;
-    logic [  SIG_W:0] remainder_q;  // below twice the denominator
-    logic [QUO_W-1:0] quotient_q;
-
-    assign normal = den_q[SIG_W-1];
-    assign solved = exact_q || (normal && (quotient_q[QUO_W-1] || exponent_q <= 1));
-    assign fits = remainder_q >= {1'b0, den_q};
-    assign difference = SIG_W'(remainder_q - {1'b0, den_q});
-    assign s_ready = !busy_q || (solved && advance);
-
-    always_ff @(posedge clk) begin
-      if (rst) busy_q <= 1'b0;
-      else if (s_ready) busy_q <= s_valid;
-      if (s_ready) begin
-        kind_q <= kind;
-        exact_q <= kind[3] || kind[2] || zero;
-        exponent_q <= $signed(EXPONENT_W'(a_exponent)) - $signed(EXPONENT_W'(b_exponent)) + EXPONENT_W'(BIAS + QUO_W);
-        den_q <= b_significand;
-        remainder_q <= {1'b0, a_significand};
-        quotient_q <= '0;
-      end else if (!solved) begin
-        exponent_q <= exponent_q + (normal ? -EXPONENT_W'(1) : EXPONENT_W'(1));
-        if (normal) begin
-          remainder_q <= {fits ? difference : remainder_q[SIG_W-1:0], 1'b0};
-          quotient_q  <= {quotient_q[QUO_W-2:0], fits};
-        end else begin
-          den_q <= den_q << 1;
-        end
-      end
-    end
-
-    openecho_float_round #(
-        .EXP_W(EXP_W),
-        .FRAC_W(FRAC_W),
-        .EXPONENT_W(EXPONENT_W - 1)
-    ) u_round (
+    ) u_serial (
         .clk,
         .rst,
-        .advance,
-        .s_valid(busy_q && solved),
-        .s_kind(kind_q),
-        .s_exponent(exponent_q[EXPONENT_W-2:0]),
-        .s_significand({quotient_q, remainder_q != '0 && !exact_q}),
+        .s_valid,
+        .s_ready,
+        .s_a,
+        .s_b,
+        .s_subtract(1'b0),
+        .s_divide  (1'b1),
         .m_valid,
-        .m_word(m_result),
+        .m_ready,
+        .m_result,
         .m_flags
     );
   end else begin : g_pipelined
-    localparam int QUO_W = SIG_W + 3;  // as above, and one more as the first may be zero
+    localparam int SIG_W = FRAC_W + 1;
+    localparam int QUO_W = SIG_W + 3;  // guard and round below the fraction, and one more as the first may be zero
+    localparam int BIAS = (1 << (EXP_W - 1)) - 1;
+    // From the least subnormal by the greatest number to the reverse, plus the bias.
+    localparam int EXPONENT_W = $clog2((3 << (EXP_W - 1)) + FRAC_W) + 1;
     localparam int PASS_W = 5 + EXPONENT_W;
 
+    openecho_float_check #(
+        .EXP_W (EXP_W),
+        .FRAC_W(FRAC_W)
+    ) u_check ();
+
+    logic advance;
+    assign advance = !m_valid || m_ready;
+    assign s_ready = advance;
+
+    // ---- normalised operands ----------------------------------------------------------------------------------------
     logic operands_valid, unused_valid;
+    logic a_sign, a_zero, a_infinite, a_nan, a_signalling;
+    logic b_sign, b_zero, b_infinite, b_nan, b_signalling;
     logic signed [EXPONENT_W-1:0] a_exponent, b_exponent, exponent;
     logic [SIG_W-1:0] a_significand, b_significand;
 
@@ -189,9 +106,22 @@ module openecho_float_div #(
         .m_signalling(b_signalling)
     );
 
-    assign s_ready  = advance;
     assign exponent = a_exponent - b_exponent;
 
+    // {sign, nan, infinite, invalid, divide_by_zero} of the quotient.
+    logic clash, zero;
+    logic [4:0] kind;
+    assign clash = (a_infinite && b_infinite) || (a_zero && b_zero);
+    assign zero = a_zero || b_infinite;
+    assign kind = {
+      a_sign ^ b_sign,
+      a_nan || b_nan || clash,
+      a_infinite || b_zero,
+      a_signalling || b_signalling || clash,
+      b_zero && !a_zero && !a_infinite && !a_nan
+    };
+
+    // ---- rows -------------------------------------------------------------------------------------------------------
     for (genvar i = 0; i < QUO_W; i++) begin : g_row
       logic valid_in, subtract, unused_carry;
       logic [PASS_W-1:0] pass_in;

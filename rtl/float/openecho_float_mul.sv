@@ -1,7 +1,7 @@
 // m_result = s_a * s_b, IEEE 754: rounded to nearest even, subnormals, infinities, signed zeros, canonical quiet NaN.
 // Infinity times zero and signalling NaNs are invalid. Flags and their order: openecho_float_round.
 //
-// Latency 6 + ceil(log4(FRAC_W + 1)) + ceil((FRAC_W + 1) / 17) cycles (binary64 13, binary16 9), one result a clock.
+// Latency 5 + ceil(log4(FRAC_W + 1)) + ceil((FRAC_W + 1) / 17) cycles (binary64 12, binary16 8), one result a clock.
 //
 // Subnormal operands are normalised first, so that the product is in [1, 4) and needs one multiplexer, not a shifter of
 // twice the width. The product grows by a row of 17 bits of one operand a stage, which is what the multipliers of FPGAs

@@ -5,7 +5,7 @@
 // exponent is shifted right to where the format puts subnormals before it is rounded, so that it is rounded once.
 // s_kind, m_word, m_flags: openecho_float_round.
 //
-// Latency 5 cycles of `advance`, one result a clock.
+// Latency 4 cycles of `advance`, one result a clock.
 module openecho_float_range #(
     parameter int EXP_W = 11,
     parameter int FRAC_W = 52,

@@ -14,13 +14,18 @@
 // just below the smallest normal number the unbounded form has one bit more, and it rounds up if guard and round are
 // both set.
 //
-// Latency 3 cycles of `advance`, one result a clock: decide, increment, pack. The increment runs over exponent and
-// fraction as one number, so that a carry out of the fraction makes the next exponent, or the smallest normal number,
-// by itself.
+// Latency 2 cycles of `advance`, one result a clock: decide, increment. The increment runs over exponent and fraction
+// as one number, so that a carry out of the fraction makes the next exponent, the smallest normal number, or infinity,
+// by itself. Infinities and NaNs that are known before it need no multiplexer behind it: the result's flip-flops are
+// set and reset instead.
+//
+// HELD 1: no registers for exponent, fraction and kind in between. The caller holds its inputs for one more cycle of
+// `advance` after the one in which s_valid was accepted, s_exponent as 0 if there is no leading one.
 module openecho_float_round #(
     parameter int EXP_W = 11,
     parameter int FRAC_W = 52,
-    parameter int EXPONENT_W = EXP_W + 1
+    parameter int EXPONENT_W = EXP_W + 1,
+    parameter bit HELD = 0
 ) (
     input  logic                  clk,
     input  logic                  rst,
@@ -33,62 +38,70 @@ module openecho_float_round #(
     output logic [EXP_W+FRAC_W:0] m_word,
     output logic [           4:0] m_flags
 );
+  localparam int ALL_ONES = (1 << EXP_W) - 1;
+
   logic s_sign, s_nan, s_infinite, s_invalid, s_divide_by_zero, s_leading, s_guard, s_round, s_sticky;
   logic [FRAC_W-1:0] s_fraction;
   assign {s_sign, s_nan, s_infinite, s_invalid, s_divide_by_zero} = s_kind;
   assign {s_leading, s_fraction, s_guard, s_round, s_sticky} = s_significand;
 
-  logic valid_q, sign_q, nan_q, infinite_q, invalid_q, divide_by_zero_q, leading_q, round_q, up_q, inexact_q;
-  logic [EXPONENT_W-1:0] exponent_q;
-  logic [FRAC_W-1:0] fraction_q;
+  logic special, beyond;
+  assign special = s_nan || s_infinite;
+  assign beyond  = s_leading && (s_exponent[EXPONENT_W-1:EXP_W] != '0 || s_exponent[EXP_W-1:0] == '1);
 
-  logic valid_q2, sign_q2, nan_q2, infinite_q2, invalid_q2, divide_by_zero_q2, leading_q2, round_q2, inexact_q2;
-  logic [EXPONENT_W-1:0] exponent_q2;
-  logic [FRAC_W-1:0] fraction_q2;
-  logic overflow, tiny;
-
-  assign overflow = exponent_q2 >= EXPONENT_W'((1 << EXP_W) - 1);
-  assign tiny = !leading_q2 && !(exponent_q2[0] && round_q2);
+  // ---- stage 1: decide ----------------------------------------------------------------------------------------------
+  // `finished`: the word is a NaN or an infinity whatever the increment makes of it. `brink`: a carry out of the
+  // fraction makes it one.
+  logic valid_q, finished_q, overflow_q, brink_q, subnormal_q, inexact_q, up_q;
 
   always_ff @(posedge clk) begin
-    if (rst) begin
-      valid_q  <= 1'b0;
-      valid_q2 <= 1'b0;
-      m_valid  <= 1'b0;
-    end else if (advance) begin
-      valid_q  <= s_valid;
-      valid_q2 <= valid_q;
-      m_valid  <= valid_q2;
-    end
+    if (rst) valid_q <= 1'b0;
+    else if (advance) valid_q <= s_valid;
     if (advance) begin
-      sign_q <= s_sign && !s_nan;
-      nan_q <= s_nan;
-      infinite_q <= s_infinite;
-      invalid_q <= s_invalid;
-      divide_by_zero_q <= s_divide_by_zero;
-      leading_q <= s_leading;
-      round_q <= s_round;
-      exponent_q <= s_leading && !s_nan && !s_infinite ? s_exponent : '0;
-      fraction_q <= s_fraction;
+      finished_q <= special || beyond;
+      overflow_q <= !special && beyond;
+      brink_q <= !special && s_leading && s_exponent == EXPONENT_W'(ALL_ONES - 1);
+      subnormal_q <= !s_leading;
+      inexact_q <= !special && (s_guard || s_round || s_sticky);
       up_q <= s_guard && (s_round || s_sticky || s_fraction[0]);
-      inexact_q <= (s_guard || s_round || s_sticky) && !s_nan && !s_infinite;
+    end
+  end
 
-      sign_q2 <= sign_q;
-      nan_q2 <= nan_q;
-      infinite_q2 <= infinite_q;
-      invalid_q2 <= invalid_q;
-      divide_by_zero_q2 <= divide_by_zero_q;
-      leading_q2 <= leading_q;
-      round_q2 <= round_q;
-      inexact_q2 <= inexact_q;
-      {exponent_q2, fraction_q2} <= {exponent_q, fraction_q} + (EXPONENT_W + FRAC_W)'(up_q);
+  // What goes into the increment.
+  logic sign, nan, invalid, divide_by_zero, round;
+  logic [ EXP_W-1:0] exponent;
+  logic [FRAC_W-1:0] fraction;
 
-      m_word <= {sign_q2, exponent_q2[EXP_W-1:0], fraction_q2};
-      if (nan_q2 || infinite_q2 || overflow) begin
-        m_word[EXP_W+FRAC_W-1:FRAC_W] <= '1;
-        m_word[FRAC_W-1:0] <= {nan_q2, {(FRAC_W - 1) {1'b0}}};
+  if (HELD) begin : g_held
+    assign {sign, nan, invalid, divide_by_zero} = {s_sign && !s_nan, s_nan, s_invalid, s_divide_by_zero};
+    assign {exponent, fraction, round} = {s_exponent[EXP_W-1:0], s_fraction, s_round};
+  end else begin : g_registered
+    always_ff @(posedge clk) begin
+      if (advance) begin
+        {sign, nan, invalid, divide_by_zero} <= {s_sign && !s_nan, s_nan, s_invalid, s_divide_by_zero};
+        {exponent, fraction, round} <= {s_leading ? s_exponent[EXP_W-1:0] : EXP_W'(0), s_fraction, s_round};
       end
-      m_flags <= {invalid_q2, divide_by_zero_q2, overflow, tiny && inexact_q2, inexact_q2 || overflow};
+    end
+  end
+
+  // ---- stage 2: increment -------------------------------------------------------------------------------------------
+  logic carry, overflow, tiny;
+  logic [ EXP_W-1:0] rounded_exponent;
+  logic [FRAC_W-1:0] rounded_fraction;
+  assign {rounded_exponent, rounded_fraction} = {exponent, fraction} + (EXP_W + FRAC_W)'(up_q);
+
+  // On the brink and below the smallest normal number the exponent is even: its last bit tells the carry.
+  assign carry = rounded_exponent[0];
+  assign overflow = overflow_q || (brink_q && carry);
+  assign tiny = subnormal_q && !(carry && round);
+
+  always_ff @(posedge clk) begin
+    if (rst) m_valid <= 1'b0;
+    else if (advance) m_valid <= valid_q;
+    if (advance) begin
+      m_word  <= {sign, rounded_exponent, rounded_fraction};
+      m_flags <= {invalid, divide_by_zero, overflow, tiny && inexact_q, inexact_q || overflow};
+      if (finished_q) m_word[EXP_W+FRAC_W-1:0] <= {{EXP_W{1'b1}}, nan, {(FRAC_W - 1) {1'b0}}};
     end
   end
 endmodule

@@ -7,12 +7,13 @@ import hashlib
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from openecho.hardware import ROOT, RTL
 from tb.env.runner import environment
-from tb.float.lanes import LANES, UNITS, Lane
+from tb.float.lanes import LANES, UNITS, Lane, ordinary, stimulus
 from tb.float.vectors import Vectors
 
 BUILD = ROOT / "build" / "float"
@@ -34,8 +35,8 @@ class Observed:
     ----------
     results : (n,) uint64 array
     flags : (n,) uint8 array
-    latency : int
-        Cycles from the first vector's transfer to its result's.
+    least, greatest : int
+        Cycles from a vector's transfer to its result's, among the first `MEASURED` results.
     span : int
         Cycles from the first to the last of the first `MEASURED` results; without meaning if there were fewer.
     violations : int
@@ -44,7 +45,8 @@ class Observed:
 
     results: np.ndarray
     flags: np.ndarray
-    latency: int
+    least: int
+    greatest: int
     span: int
     violations: int
 
@@ -63,11 +65,37 @@ def stream(lane: Lane, vectors: Vectors, simulator: str, directory: Path) -> Obs
     log = directory / f"{lane.name}.log"
     if not log.is_file():
         raise BenchError(f"{lane.name} on {simulator}: the simulation did not end ({directory})")
-    latency, span, violations = map(int, log.read_text().split())
+    least, greatest, span, violations = map(int, log.read_text().split())
     # Undefined digits read as all ones, which no flags are.
     digits = (directory / f"{lane.name}.out").read_text().replace("x", "f").replace("z", "f")
     rows = np.frombuffer(bytes.fromhex(digits), np.dtype([("flags", "u1"), ("result", ">u8")]))
-    return Observed(rows["result"].astype(np.uint64), rows["flags"], latency, span, violations)
+    return Observed(rows["result"].astype(np.uint64), rows["flags"], least, greatest, span, violations)
+
+
+def measure(lane: Lane, count: int, simulator: str, directory: Path) -> dict[str, Any]:
+    """Stream vectors through a lane and score them: what a row of a report says of it.
+
+    Cycles are those of ordinary numbers, since an iterative unit takes a few for a NaN and hundreds for a subnormal.
+
+    Raises
+    ------
+    BenchError
+        As `stream`, and if the lane broke the stream contract.
+    """
+    sent = stimulus(lane, count)
+    seen = stream(lane, sent, simulator, directory)
+    timed = stream(lane, ordinary(lane, MEASURED), simulator, directory)
+    if seen.violations:
+        raise BenchError(f"{lane.name} on {simulator}: broke the stream contract {seen.violations} times ({directory})")
+    results, flags = lane.expected(sent)
+    got = seen.results.size
+    wrong = np.count_nonzero((seen.results != results[:got]) | (seen.flags != flags[:got]))
+    return {
+        "results": sent.size,
+        "mismatches": int(wrong) + sent.size - got,
+        "latency_cycles": {"min": timed.least, "max": timed.greatest},
+        "cycles_per_result": timed.span / (MEASURED - 1),
+    }
 
 
 def refusal(unit: str, values: dict[str, int], simulator: str, directory: Path) -> str:

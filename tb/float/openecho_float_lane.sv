@@ -1,18 +1,18 @@
 // One float unit between two files: streams the vectors of NAME.in through it, writes its results to NAME.out and what
 // it saw of the stream to NAME.log. Without NAME.in the lane stands still, its clock too, and costs no time.
 //
-// NAME.in has 17 bytes a vector, big-endian: control (bit 0: subtract), operand a, operand b. NAME.out has a line a
-// result: 2 hexadecimal digits for the flags, 16 for the result, sign-extended; {less, equal, unordered} for a
-// comparison. NAME.log: cycles from the first vector's transfer to its result's, cycles from the first to the last of
-// MEASURED results, and how often the unit broke the contract: no result until it could be taken, a stalled one dropped
-// or changed.
+// NAME.in has 17 bytes a vector, big-endian: control (bit 0: subtract, bit 1: divide), operand a, operand b. NAME.out
+// has a line a result: 2 hexadecimal digits for the flags, 16 for the result, sign-extended; {less, equal, unordered}
+// for a comparison. NAME.log, of the first MEASURED results: least and greatest number of cycles from a vector's transfer
+// to its result's, and cycles from the first to the last result; then how often the unit broke the contract: no result
+// until it could be taken, a stalled one dropped or changed.
 //
 // Before the first vector the unit is filled, stalled, and reset. Every other block of vectors runs with random gaps
 // and stalls.
 module openecho_float_lane #(
     // Without a type: Icarus 11 loses a string that is given to a vector.
     parameter NAME = "",  // verilog_lint: waive explicit-parameter-storage-type
-    parameter int UNIT = 0,  // 0 add, 1 mul, 2 div, 3 compare, 4 from_int, 5 to_fixed
+    parameter int UNIT = 0,  // 0 add, 1 mul, 2 div, 3 compare, 4 from_int, 5 to_fixed, 6 serial
     parameter int EXP_W = 11,
     parameter int FRAC_W = 52,
     parameter int ITERATIVE = 1,
@@ -39,8 +39,9 @@ module openecho_float_lane #(
   if (UNIT == 0) begin : g_add
     logic [WORD_W-1:0] m_result;
     openecho_float_add #(
-        .EXP_W (EXP_W),
-        .FRAC_W(FRAC_W)
+        .EXP_W(EXP_W),
+        .FRAC_W(FRAC_W),
+        .ITERATIVE(ITERATIVE != 0)
     ) dut (
         .s_a(a[WORD_W-1:0]),
         .s_b(b[WORD_W-1:0]),
@@ -89,17 +90,18 @@ module openecho_float_lane #(
   end else if (UNIT == 4) begin : g_from_int
     logic [WORD_W-1:0] m_result;
     openecho_float_from_int #(
-        .EXP_W (EXP_W),
+        .EXP_W(EXP_W),
         .FRAC_W(FRAC_W),
-        .INT_W (INT_W),
-        .SCALE (SCALE)
+        .INT_W(INT_W),
+        .SCALE(SCALE),
+        .ITERATIVE(ITERATIVE != 0)
     ) dut (
         .s_value(a[INT_W-1:0]),
         .m_flags(flags),
         .*
     );
     assign result = 64'(m_result);
-  end else begin : g_to_fixed
+  end else if (UNIT == 5) begin : g_to_fixed
     logic signed [INT_W+FRAC-1:0] m_value;
     openecho_float_to_fixed #(
         .EXP_W (EXP_W),
@@ -112,10 +114,25 @@ module openecho_float_lane #(
         .*
     );
     assign result = 64'(m_value);
+  end else begin : g_serial
+    logic [WORD_W-1:0] m_result;
+    openecho_float_serial #(
+        .EXP_W (EXP_W),
+        .FRAC_W(FRAC_W)
+    ) dut (
+        .s_a(a[WORD_W-1:0]),
+        .s_b(b[WORD_W-1:0]),
+        .s_subtract(control[0]),
+        .s_divide(control[1]),
+        .m_flags(flags),
+        .*
+    );
+    assign result = 64'(m_result);
   end
 
   integer source, sink, report, got;
-  integer cycle, sent, received, quiet, first_sent, first_received, last_measured, violations;
+  integer cycle, sent, received, quiet, latency, least, greatest, first_received, last_measured, violations;
+  integer sent_at[MEASURED];
   logic stalled, held;
   logic [31:0] random;
   logic [8*17-1:0] vector;
@@ -137,7 +154,8 @@ module openecho_float_lane #(
     sent = 0;
     received = 0;
     quiet = 0;
-    first_sent = 0;
+    least = 0;
+    greatest = 0;
     first_received = 0;
     last_measured = 0;
     violations = 0;
@@ -163,11 +181,16 @@ module openecho_float_lane #(
       end
       m_ready <= !(stalled && random[9]);
       if (s_valid && s_ready) begin
-        if (sent == 0) first_sent <= cycle;
+        if (sent < MEASURED) sent_at[sent] <= cycle;
         sent <= sent + 1;
       end
       if (m_valid && m_ready) begin
         $fwrite(sink, "%02x%016x\n", {3'b000, flags}, result);
+        if (received < MEASURED) begin
+          latency = cycle - sent_at[received];
+          if (received == 0 || latency < least) least <= latency;
+          if (received == 0 || latency > greatest) greatest <= latency;
+        end
         if (received == 0) first_received <= cycle;
         if (received == MEASURED - 1) last_measured <= cycle;
         received <= received + 1;
@@ -178,7 +201,7 @@ module openecho_float_lane #(
       quiet <= (s_valid && s_ready) || (m_valid && m_ready) ? 0 : quiet + 1;
       if (quiet == QUIET_CYCLES) begin
         report = $fopen($sformatf("%0s.log", NAME), "w");
-        $fwrite(report, "%0d %0d %0d\n", first_received - first_sent, last_measured - first_received, violations);
+        $fwrite(report, "%0d %0d %0d %0d\n", least, greatest, last_measured - first_received, violations);
         $fclose(report);
         $fclose(sink);
         done <= 1'b1;

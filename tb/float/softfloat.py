@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import softfloatpy
 
 from openecho.golden.floating import BINARY16, BINARY32, BINARY64, INVALID, Format
-from tb.float.vectors import Vectors
+from tb.float.vectors import SUBTRACT, Vectors
 
 _PREFIX = {BINARY16: "f16", BINARY32: "f32", BINARY64: "f64"}
 _TYPES: dict[Format, Any] = {
@@ -45,15 +45,18 @@ def expected(unit: str, form: Format, parameters: Mapping[str, int], vectors: Ve
         case "to_fixed":
             return _to_fixed(form, parameters["INT_W"], vectors)
         case "add":
-            subtract = vectors["control"] == 1
-            plus, plus_flags = _operation("add", form, vectors[~subtract])
-            minus, minus_flags = _operation("sub", form, vectors[subtract])
-            words, flags = np.empty(len(vectors), np.uint64), np.empty(len(vectors), np.uint8)
-            words[~subtract], words[subtract] = plus, minus
-            flags[~subtract], flags[subtract] = plus_flags, minus_flags
-            return words, flags
+            return _chosen(("add", "sub"), vectors["control"] & SUBTRACT, form, vectors)
+        case "serial":
+            return _chosen(("add", "sub", "div", "div"), vectors["control"], form, vectors)
         case _:
             return _operation(unit, form, vectors)
+
+
+def _chosen(names: Sequence[str], choice: np.ndarray, form: Format, vectors: Vectors) -> tuple[np.ndarray, np.ndarray]:
+    words, flags = np.empty(len(vectors), np.uint64), np.empty(len(vectors), np.uint8)
+    for k, name in enumerate(names):
+        words[choice == k], flags[choice == k] = _operation(name, form, vectors[choice == k])
+    return words, flags
 
 
 def _operation(name: str, form: Format, vectors: Vectors) -> tuple[np.ndarray, np.ndarray]:

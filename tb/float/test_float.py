@@ -6,7 +6,6 @@ OPENECHO_FLOAT_VECTORS sets how many vectors a unit gets on Verilator: 50,000, o
 from __future__ import annotations
 
 import os
-import zlib
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +13,12 @@ import pytest
 
 from tb.env.runner import find_simulators
 from tb.float import bench, vectors
-from tb.float.lanes import FORMATS, LANES, SMALL, Lane
+from tb.float.lanes import FORMATS, LANES, SMALL, Lane, stimulus
 
 COUNT = {"verilator": int(os.environ.get("OPENECHO_FLOAT_VECTORS", "50000")), "icarus": 10_000}
 FASTEST = find_simulators()[:1]
 EXHAUSTIVE = 1 << 19  # as many as from_int has integers; the small format has 65,536 pairs
+NAMES = [pytest.param(name, marks=pytest.mark.arithmetic(lane.arithmetic)) for name, lane in LANES.items()]
 ILLEGAL = [
     ("add", {"EXP_W": 2}, "EXP_W is 2; exponents of 3 to 15 bits are supported"),
     ("mul", {"EXP_W": 16}, "EXP_W is 16; exponents of 3 to 15 bits are supported"),
@@ -34,18 +34,12 @@ ILLEGAL = [
 ]
 
 
-def stimulus(lane: Lane, count: int) -> vectors.Vectors:
-    rng = np.random.default_rng(zlib.crc32(lane.name.encode()))
-    if lane.unit == "from_int":
-        return vectors.integers(lane.parameters["INT_W"], count, rng)
-    if lane.unit == "to_fixed":
-        return vectors.words(lane.form, lane.parameters["INT_W"], lane.parameters["FRAC"], count, rng)
-    if lane.form == SMALL and count >= EXHAUSTIVE:
-        return vectors.all_pairs(lane.form)
-    return vectors.pairs(lane.form, count, rng)
+def first_latency(lane: Lane, vector: tuple[int, int, int], simulator: str, directory: Path) -> int:
+    """Cycles that one vector takes."""
+    return bench.stream(lane, np.array([vector], vectors.VECTOR), simulator, directory).least
 
 
-@pytest.mark.parametrize("name", LANES)
+@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("simulator", find_simulators())
 def test_every_result_and_flag_is_exact_under_gaps_and_stalls(simulator: str, name: str, tmp_path: Path) -> None:
     lane = LANES[name]
@@ -65,15 +59,16 @@ def test_every_result_and_flag_is_exact_under_gaps_and_stalls(simulator: str, na
     assert seen.violations == 0
 
 
-@pytest.mark.parametrize("name", LANES)
+@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("simulator", find_simulators())
 def test_latency_and_throughput_are_as_stated(simulator: str, name: str, tmp_path: Path) -> None:
     lane = LANES[name]
-    ones = np.zeros(bench.MEASURED, vectors.VECTOR)
-    ones["a"] = ones["b"] = lane.form.bias << lane.form.frac_w
-    seen = bench.stream(lane, ones, simulator, tmp_path)
-    assert seen.latency == lane.latency
-    assert seen.span == (bench.MEASURED - 1) * lane.interval
+    for control, latency in lane.latencies.items():
+        same = np.zeros(bench.MEASURED, vectors.VECTOR)
+        same["control"], same["a"], same["b"] = control, lane.operand, lane.operand
+        seen = bench.stream(lane, same, simulator, tmp_path)
+        assert (seen.least, seen.greatest) == (latency, latency)
+        assert seen.span == (bench.MEASURED - 1) * lane.interval(latency)
 
 
 @pytest.mark.parametrize(
@@ -86,25 +81,55 @@ def test_latency_and_throughput_are_as_stated(simulator: str, name: str, tmp_pat
         (0x00000001, 0x00000001, 23 + 23),
         (0x3F800000, 0x00400000, 1),
         (0x00800000, 0x40000000, -1),
-        (0x00800000, 0x7F000000, -23 - 3),
+        (0x00800000, 0x7F000000, -23 - 2),
         (0x7FC00000, 0x3F800000, -23 - 3),
         (0x00000000, 0x3F800000, -23 - 3),
     ],
 )
+@pytest.mark.parametrize("name", ["float32_div_iterative", "float32_serial"])
 @pytest.mark.parametrize("simulator", FASTEST)
 def test_an_iterative_division_takes_a_cycle_for_each_place_it_needs(
-    simulator: str, a: int, b: int, extra: int, tmp_path: Path
+    simulator: str, name: str, a: int, b: int, extra: int, tmp_path: Path
 ) -> None:
-    lane = LANES["float32_div_iterative"]
-    vector = np.zeros(1, vectors.VECTOR)
-    vector["a"], vector["b"] = a, b
-    assert bench.stream(lane, vector, simulator, tmp_path).latency == lane.latency + extra
+    lane = LANES[name]
+    assert first_latency(lane, (vectors.DIVIDE, a, b), simulator, tmp_path) == max(lane.latencies.values()) + extra
 
 
+@pytest.mark.parametrize(
+    ("a", "b", "shifts"),
+    [
+        (0x3F800000, 0x3FFFFFFF, 0),
+        (0x40000000, 0x3F800000, 1 + 1),
+        (0x3F800000, 0x40000000, 1 + 1),
+        (0x40000000, 0x3FFFFFFF, 1 + 1),
+        (0x4B800000, 0x3F800000, 24 + 1),
+        (0x7F000000, 0x3F800000, 31 + 1),
+        (0x3F800000, 0x7F000000, 32 + 1),
+        (0x3F800000, 0xBF800001, 1 + 23),
+        (0xBF800001, 0x3F800000, 1 + 23),
+        (0x3F800000, 0xBF000000, 1 + 1 + 1),
+        (0x3F800000, 0xBF800000, 1),
+        (0x00000001, 0x00000001, 1),
+        (0x00800000, 0x80800001, 1),
+        (0x00000000, 0x80000000, 1),
+        (0x7F800000, 0x3F800000, -1),
+        (0x7FC00000, 0x3F800000, -1),
+    ],
+)
+@pytest.mark.parametrize("name", ["float32_add_iterative", "float32_serial"])
+@pytest.mark.parametrize("simulator", FASTEST)
+def test_an_iterative_addition_takes_a_cycle_for_each_place_it_shifts(
+    simulator: str, name: str, a: int, b: int, shifts: int, tmp_path: Path
+) -> None:
+    lane = LANES[name]
+    assert first_latency(lane, (0, a, b), simulator, tmp_path) == min(lane.latencies.values()) + shifts
+
+
+@pytest.mark.parametrize("unit", ["add", "div"])
 @pytest.mark.parametrize("name", FORMATS)
 @pytest.mark.parametrize("simulator", FASTEST)
-def test_both_forms_of_the_divider_give_the_same_bits(simulator: str, name: str, tmp_path: Path) -> None:
-    lanes = [LANES[f"{name}_div_{kind}"] for kind in ("iterative", "pipelined")]
+def test_both_forms_of_a_unit_give_the_same_bits(simulator: str, name: str, unit: str, tmp_path: Path) -> None:
+    lanes = [LANES[f"{name}_{unit}_{kind}"] for kind in ("iterative", "pipelined")]
     sent = stimulus(lanes[0], COUNT[simulator])
     iterative, pipelined = (bench.stream(lane, sent, simulator, tmp_path) for lane in lanes)
     assert iterative.results.size == sent.size

@@ -14,10 +14,12 @@ Vectors = npt.NDArray[np.void]
 Words = npt.NDArray[np.uint64]
 VECTOR = np.dtype([("control", "u1"), ("a", ">u8"), ("b", ">u8")])
 """As openecho_float_lane reads them."""
+SUBTRACT, DIVIDE = 1, 2
+"""Bits of `control`, which units that don't have the choice ignore; with DIVIDE, so is SUBTRACT."""
 
 
 def pairs(form: Format, count: int, rng: np.random.Generator) -> Vectors:
-    """Pairs of words, `count` of them and no fewer than the directed ones; half of them to be subtracted."""
+    """Pairs of words, `count` of them and no fewer than the directed ones; control at random, but 0 for the first."""
     first = np.array([[form.bias << form.frac_w] * 2], np.uint64)  # 1 and 1, for the latency
     directed = np.concatenate([first, _special_pairs(form), _close_pairs(form, rng), _halfway_pairs(form, rng)])
     missing = max(count - len(directed), 0)
@@ -25,11 +27,12 @@ def pairs(form: Format, count: int, rng: np.random.Generator) -> Vectors:
 
 
 def all_pairs(form: Format) -> Vectors:
-    """Every pair of words, to be added, then to be subtracted."""
+    """Every pair of words, to be added, then to be subtracted, then to be divided."""
     a, b = np.divmod(np.arange(1 << 2 * form.word_w), 1 << form.word_w)
-    vectors = np.zeros(2 * a.size, VECTOR)
-    vectors["a"], vectors["b"] = np.tile(a, 2), np.tile(b, 2)
-    vectors["control"][a.size :] = 1
+    controls = (0, SUBTRACT, DIVIDE)
+    vectors = np.zeros(len(controls) * a.size, VECTOR)
+    vectors["a"], vectors["b"] = np.tile(a, len(controls)), np.tile(b, len(controls))
+    vectors["control"] = np.repeat(controls, a.size)
     return vectors
 
 
@@ -63,6 +66,15 @@ def words(form: Format, int_w: int, frac: int, count: int, rng: np.random.Genera
     vectors = np.zeros(chosen.size, VECTOR)
     vectors["a"] = chosen
     return vectors
+
+
+def alike(form: Format, count: int, rng: np.random.Generator) -> Vectors:
+    """Pairs of random numbers from 1 to 16, control at random."""
+    words = [
+        _join(form, np.zeros(count, np.int64), form.bias + rng.integers(0, 4, count), _fractions(form, count, rng))
+        for _ in range(2)
+    ]
+    return _vectors(np.column_stack(words), rng)
 
 
 def specials(form: Format) -> Words:
@@ -164,5 +176,5 @@ def _join(
 def _vectors(words: Words, rng: np.random.Generator) -> Vectors:
     vectors = np.zeros(len(words), VECTOR)
     vectors["a"], vectors["b"] = words.T
-    vectors["control"][1:] = rng.integers(0, 2, len(words) - 1)
+    vectors["control"][1:] = rng.integers(0, SUBTRACT | DIVIDE, len(words) - 1, endpoint=True)
     return vectors

@@ -1,0 +1,30 @@
+"""`pytest --arith`: tests of one arithmetic, and those that belong to none."""
+
+from __future__ import annotations
+
+import pytest
+
+from openecho.golden import ARITHMETICS
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option."""
+    parser.addoption("--arith", help=f"one of {', '.join(ARITHMETICS)}; all if left out")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Refuse an arithmetic that there is not."""
+    config.addinivalue_line("markers", "arithmetic(name): what the RTL under test is built for")
+    chosen = config.getoption("--arith")
+    if chosen not in (None, *ARITHMETICS):
+        pytest.exit(f"error: ARITH: found {chosen!r}, expected one of {', '.join(ARITHMETICS)}", returncode=2)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out the tests of other arithmetics."""
+    chosen = config.getoption("--arith")
+    if chosen is None:
+        return
+    others = [item for item in items if any(mark.args[0] != chosen for mark in item.iter_markers("arithmetic"))]
+    config.hook.pytest_deselected(items=others)
+    items[:] = [item for item in items if item not in others]
