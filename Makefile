@@ -4,27 +4,30 @@ MAKEFLAGS += --no-print-directory
 
 PYTHON ?= python3
 MODULE ?=
+ARITH  ?=
 SIM    ?=
 DATA   ?=
 SEED   ?=
 WAVES  ?=
+CLOCK  ?=
 
 VENV   := .venv
 READY  := $(VENV)/.ready
 RUN    := $(VENV)/bin/python
-SIM_FLAGS := $(if $(MODULE),--module '$(MODULE)') $(if $(SIM),--sim '$(SIM)') $(if $(DATA),--data '$(DATA)') \
-             $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(WAVES)),--waves)
+ARITH_FLAG := $(if $(ARITH),--arith '$(ARITH)')
+SIM_FLAGS  := $(if $(MODULE),--module '$(MODULE)') $(ARITH_FLAG) $(if $(SIM),--sim '$(SIM)') \
+              $(if $(DATA),--data '$(DATA)') $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(WAVES)),--waves)
 
-.PHONY: help sim test vectors lint format mutate precision readme clean
+.PHONY: help sim test vectors lint format mutate synth precision readme clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-sim: $(READY) ## simulate every module against its model [MODULE=] [SIM=verilator|icarus] [DATA=file.npz] [SEED=] [WAVES=1]
+sim: $(READY) ## simulate all against their models [MODULE=] [ARITH=] [SIM=verilator|icarus] [DATA=file.npz] [SEED=] [WAVES=1]
 	@$(RUN) scripts/sim.py $(SIM_FLAGS)
 
-test: $(READY) ## run all tests: the model's and the RTL's, on every simulator found
-	@$(RUN) -m pytest -n auto
+test: $(READY) ## run all tests: the model's and the RTL's, on every simulator found [ARITH=fixed|float16|float32|float64]
+	@$(RUN) -m pytest -n auto $(ARITH_FLAG)
 
 vectors: $(READY) ## stream a million vectors through every float unit, where `make test` takes 50,000
 	@OPENECHO_FLOAT_VECTORS=1000000 $(RUN) -m pytest -n auto tb/float
@@ -37,6 +40,9 @@ format: $(READY) ## lay out Python and SystemVerilog
 
 mutate: $(READY) ## break the RTL line by line and count what the benches catch
 	@$(RUN) scripts/mutate.py
+
+synth: $(VENV)/.synth ## area on xc7, with CLOCK=1 also the clock on ECP5, of all modules and float units [MODULE=] [CLOCK=1]
+	@$(RUN) scripts/synth.py $(if $(MODULE),--module '$(MODULE)') $(if $(filter-out 0,$(CLOCK)),--clock)
 
 precision: $(READY) ## Monte Carlo of the echo position against the Cramér–Rao bound [SEED=]
 	@$(RUN) -m openecho.study.precision $(if $(SEED),--seed '$(SEED)')
@@ -55,4 +61,9 @@ $(READY): pyproject.toml
 	@echo 'setting up $(VENV) from pyproject.toml (once, a minute or two)'
 	@$(RUN) -c '' 2>/dev/null || $(PYTHON) -m venv --clear $(VENV)
 	@$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+# The open synthesis tools, only where they are wanted.
+$(VENV)/.synth: $(READY)
+	@$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[synth]'
 	@touch $@

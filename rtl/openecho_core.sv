@@ -7,12 +7,13 @@ module openecho_core
   import openecho_pkg::*;
 #(
     parameter int SAMPLE_W = 11,
+    parameter int EXP_W = 0,
     parameter int FRAC = 16,
     parameter int MAX_SAMPLES = 4096,
     parameter int TAP_COUNT = PAPER_TAP_COUNT,
     parameter logic [TAPS_W-1:0] TAPS = PAPER_TAPS,
     localparam int INDEX_W = $clog2(MAX_SAMPLES),
-    localparam int WORD_W = record_word_width(SAMPLE_W, FRAC, MAX_SAMPLES)
+    localparam int WORD_W = record_word_width(SAMPLE_W, EXP_W, FRAC, MAX_SAMPLES)
 ) (
     input  logic                           clk,
     input  logic                           rst,
@@ -30,11 +31,11 @@ module openecho_core
     output logic [RECORD_WORDS*WORD_W-1:0] m_record
 );
   localparam int AMP_W = SAMPLE_W + AMP_FRAC;
-  localparam int POSITION_W = INDEX_W + FRAC;
-  localparam int PEAK_W = POSITION_W > AMP_W ? POSITION_W : AMP_W;
+  localparam int POSITION_W = position_width(EXP_W, FRAC, MAX_SAMPLES);
+  localparam int VALUE_W = value_width(SAMPLE_W, EXP_W, FRAC, MAX_SAMPLES);
   localparam int SUM_W = response_width(TAPS, TAP_COUNT, 0, SAMPLE_W);
-  localparam int FIRST_W = response_width(TAPS, TAP_COUNT, 1, SAMPLE_W);
-  localparam int SECOND_W = response_width(TAPS, TAP_COUNT, 2, SAMPLE_W);
+  localparam int FIRST_W = difference_width(TAPS, TAP_COUNT, 1, SAMPLE_W, EXP_W, FRAC);
+  localparam int SECOND_W = difference_width(TAPS, TAP_COUNT, 2, SAMPLE_W, EXP_W, FRAC);
 
   logic sample_valid, sample_ready, sample_last, sample_overlong;
   logic [SAMPLE_W-1:0] sample;
@@ -61,10 +62,8 @@ module openecho_core
   logic [FLAGS_W-1:0] component_flags;
 
   logic echo_valid, echo_ready, echo_last;
-  logic [POSITION_W-1:0] echo_centre, echo_width;
-  logic [PEAK_W-1:0] echo_peak;
-  logic signed [POSITION_W:0] echo_time;
-  logic [AMP_W-1:0] echo_amplitude;
+  logic [VALUE_W-1:0] echo_centre, echo_peak, echo_width, echo_amplitude;
+  logic signed [VALUE_W-1:0] echo_time;
   logic [FLAGS_W-1:0] echo_flags;
 
   openecho_reader #(
@@ -115,6 +114,8 @@ module openecho_core
 
   openecho_second_difference #(
       .SAMPLE_W(SAMPLE_W),
+      .EXP_W(EXP_W),
+      .FRAC(FRAC),
       .MAX_SAMPLES(MAX_SAMPLES),
       .TAP_COUNT(TAP_COUNT),
       .TAPS(TAPS)
@@ -140,6 +141,7 @@ module openecho_core
 
   openecho_inflection #(
       .SAMPLE_W(SAMPLE_W),
+      .EXP_W(EXP_W),
       .FRAC(FRAC),
       .MAX_SAMPLES(MAX_SAMPLES),
       .TAP_COUNT(TAP_COUNT),
@@ -169,6 +171,7 @@ module openecho_core
 
   openecho_parameters #(
       .SAMPLE_W(SAMPLE_W),
+      .EXP_W(EXP_W),
       .FRAC(FRAC),
       .MAX_SAMPLES(MAX_SAMPLES)
   ) u_parameters (
@@ -204,6 +207,7 @@ module openecho_core
 
   openecho_output #(
       .SAMPLE_W(SAMPLE_W),
+      .EXP_W(EXP_W),
       .FRAC(FRAC),
       .MAX_SAMPLES(MAX_SAMPLES)
   ) u_output (

@@ -17,31 +17,34 @@
 // Peak. The first difference falls all along a run, so it goes from positive to not positive at most once: there the
 // filtered waveform has its maximum. A run without one is a shoulder (FLAG_NO_PEAK, m_peak undefined).
 //
-// Interpolation. All three are base + numerator / denominator with a numerator between zero and the denominator, so
-// they share one divider. A kept run queues its operations (left, peak, right); the quotients come back in that order.
-// Rounding: half up to FRAC bits. Positions cannot overflow: they lie inside the record.
+// Interpolation. All three lie between a beat and the next, of opposite signs: openecho_interpolate makes a position of
+// the two values, in the arithmetic that EXP_W chooses. A kept run queues its operations (left, peak, right); positions
+// come back in that order. An inflection at the edge of the record is that of a zero at the edge's beat. Differences are
+// compared with zero, which takes no more than the sign and any bit, in either arithmetic.
 //
 // Maximum of the raw samples strictly between the beats that bracket the run. FLAG_SATURATED: it is full scale.
 //
-// Latency from the beat that ends a run to its component: 3 + rows of the divider cycles (21 at FRAC 16), and 1 more
+// Latency from the beat that ends a run to its component: 4 + rows of the divider cycles (22 at FRAC 16), and 1 more
 // with a peak, if the divider is idle; from the last beat of a waveform without a run in work to its trailer: 3.
-// Throughput: one beat a clock. A run takes the divider 3 * DIVIDE_LOOPS = 6 clocks and kept runs are at least
+// Throughput: one beat a clock. In fixed point a run takes the divider 3 * 2 = 6 clocks and kept runs are at least
 // min_interval + 2 beats apart, so with min_interval >= 5 the input never waits for it, whatever the waveform; below
 // that, QUEUE operations take up a burst and then the input stalls. The queue also bridges the time until a waveform's
-// noise is known, for which runs 7 beats apart just fit it.
+// noise is known, for which runs 7 beats apart just fit it. In floating point an operation takes about FRAC + 9 clocks:
+// the queue takes up what comes faster, as in a waveform of several echoes, and noise of many kept runs stalls the input.
 module openecho_inflection
   import openecho_pkg::*;
 #(
     parameter int SAMPLE_W = 11,
+    parameter int EXP_W = 0,
     parameter int FRAC = 16,
     parameter int MAX_SAMPLES = 4096,
     parameter int TAP_COUNT = PAPER_TAP_COUNT,
     parameter logic [TAPS_W-1:0] TAPS = PAPER_TAPS,
-    localparam int FIRST_W = response_width(TAPS, TAP_COUNT, 1, SAMPLE_W),
-    localparam int SECOND_W = response_width(TAPS, TAP_COUNT, 2, SAMPLE_W),
+    localparam int FIRST_W = difference_width(TAPS, TAP_COUNT, 1, SAMPLE_W, EXP_W, FRAC),
+    localparam int SECOND_W = difference_width(TAPS, TAP_COUNT, 2, SAMPLE_W, EXP_W, FRAC),
     localparam int INDEX_W = $clog2(MAX_SAMPLES),
     localparam int LENGTH_W = INDEX_W + 1,
-    localparam int POSITION_W = INDEX_W + FRAC
+    localparam int POSITION_W = position_width(EXP_W, FRAC, MAX_SAMPLES)
 ) (
     input  logic                         clk,
     input  logic                         rst,
@@ -66,17 +69,15 @@ module openecho_inflection
 );
   localparam int QUEUE = 64;
   localparam int QUEUE_MARGIN = 4;  // what the beats already accepted may still queue: left, peak, right, end
-  localparam int DIVIDE_LOOPS = 2;
-  localparam int DEN_W = SECOND_W;  // |second| + |next second| of opposite sign
 
   // Beat i of `second` stands at i - (TAP_COUNT+1)/2 raw bins, of `first` at i - TAP_COUNT/2: whole bins, and half a
   // bin for one of the two, depending on whether TAP_COUNT is even.
   localparam bit EVEN = TAP_COUNT % 2 == 0;
   localparam int DELAY = (TAP_COUNT + 2) / 2;
-  localparam logic [FRAC-1:0] HALF_BIN = {1'b1, {(FRAC - 1) {1'b0}}};
 
   openecho_check #(
       .SAMPLE_W(SAMPLE_W),
+      .EXP_W(EXP_W),
       .FRAC(FRAC),
       .MAX_SAMPLES(MAX_SAMPLES),
       .TAP_COUNT(TAP_COUNT)
@@ -126,25 +127,24 @@ module openecho_inflection
   assign run  = run_starts ? INDEX_W'(1) : run_q + INDEX_W'(!positive);
   assign kept = (run_ends || (run_cut && !run_starts && !truncated_q)) && run > min_interval && run > INDEX_W'(1);
 
-  // ---- operands of the three interpolations -------------------------------------------------------------------------
-  logic edge_of_record;  // an inflection at the edge of the record is not interpolated
+  // ---- operands of the three interpolations: what lies on either side of the zero, and the index of the first ---------
+  // Words made from integers of INT_W bits have INT_W - 2 fraction bits; below them there is nothing to store.
+  localparam int INT_W = response_width(TAPS, TAP_COUNT, 2, SAMPLE_W);
+  localparam int EMPTY_W = EXP_W > 0 && FRAC > INT_W - 2 ? FRAC - (INT_W - 2) : 0;
+  localparam int Y_W = SECOND_W - EMPTY_W;
+  localparam logic [Y_W-1:0] POSITIVE = Y_W'(1) << (Y_W - 2);  // any number, and 2 in floating point
+  logic edge_of_record;
   logic [INDEX_W-1:0] crossing_index;
-  logic [DEN_W-1:0] crossing_num, crossing_den;
-  logic [DEN_W-1:0] left_num_q, left_den_q, peak_num_q, peak_den_q, right_num_q, right_den_q;
+  logic [Y_W-1:0] crossing_y, crossing_next;
+  logic [Y_W-1:0] left_y_q, left_next_q, peak_y_q, peak_next_q, right_y_q, right_next_q;
   logic [INDEX_W-1:0] left_index_q, peak_index_q, right_index_q;
   logic peak_now, has_peak_q, has_peak;
   logic [SAMPLE_W-1:0] maximum_q, maximum;
 
   assign edge_of_record = run_starts ? state_q == IDLE : run_cut;
   assign crossing_index = s_index - INDEX_W'(DELAY + 1) + INDEX_W'(edge_of_record);
-  always_comb begin
-    crossing_num = positive ? -second_q : second_q;
-    crossing_den = positive ? s_second - second_q : second_q - s_second;
-    if (edge_of_record) begin
-      crossing_num = '0;
-      crossing_den = DEN_W'(1);
-    end
-  end
+  assign crossing_y = edge_of_record ? '0 : Y_W'(second_q >> EMPTY_W);
+  assign crossing_next = edge_of_record ? POSITIVE : Y_W'(s_second >> EMPTY_W);
 
   assign peak_now = first_q > 0 && s_first <= 0;
   assign has_peak = (!run_starts && has_peak_q) || (peak_now && !positive);
@@ -161,18 +161,19 @@ module openecho_inflection
       maximum_q  <= maximum;
       has_peak_q <= has_peak;
       if (run_starts) begin
-        left_num_q   <= crossing_num;
-        left_den_q   <= crossing_den;
+        left_y_q <= crossing_y;
+        left_next_q <= crossing_next;
         left_index_q <= crossing_index;
       end
+      // Of opposite signs and -second apart, so that Y_W bits hold either.
       if (peak_now && !positive) begin
-        peak_num_q   <= DEN_W'(first_q);
-        peak_den_q   <= -s_second;
+        peak_y_q <= Y_W'(first_q >> EMPTY_W);
+        peak_next_q <= Y_W'(s_first >> EMPTY_W);
         peak_index_q <= s_index - INDEX_W'(EVEN ? DELAY : DELAY + 1);
       end
       if (kept) begin
-        right_num_q   <= crossing_num;
-        right_den_q   <= crossing_den;
+        right_y_q <= crossing_y;
+        right_next_q <= crossing_next;
         right_index_q <= crossing_index;
       end
     end
@@ -200,7 +201,7 @@ module openecho_inflection
   logic [SAMPLE_W-1:0] note_maximum;
   logic [  NOTE_W-1:0] note;
   logic operand_push, unused_operand_ready, operand_valid, operand_ready;
-  logic [DEN_W-1:0] push_num, push_den, operand_num, operand_den;
+  logic [Y_W-1:0] push_y, push_next, operand_y, operand_next;
 
   assign waits = peak_waits_q || right_waits_q || finish_waits_q;
   assign queue_ready = note_level <= ($clog2(QUEUE) + 1)'(QUEUE - QUEUE_MARGIN - 1);
@@ -229,8 +230,8 @@ module openecho_inflection
   always_comb begin
     push_kind = LEFT;
     push_index = LENGTH_W'(left_index_q);
-    push_num = left_num_q;
-    push_den = left_den_q;
+    push_y = left_y_q;
+    push_next = left_next_q;
     push_flags = '0;
     push_flags[FLAG_SATURATED] = &maximum;
     push_flags[FLAG_TRUNCATED] = truncated_q || run_cut;
@@ -238,13 +239,13 @@ module openecho_inflection
     if (peak_waits_q) begin
       push_kind  = PEAK;
       push_index = LENGTH_W'(peak_index_q);
-      push_num   = peak_num_q;
-      push_den   = peak_den_q;
+      push_y     = peak_y_q;
+      push_next  = peak_next_q;
     end else if (right_waits_q) begin
       push_kind  = RIGHT;
       push_index = LENGTH_W'(right_index_q);
-      push_num   = right_num_q;
-      push_den   = right_den_q;
+      push_y     = right_y_q;
+      push_next  = right_next_q;
     end else if (finish_waits_q) begin
       push_kind = FINISH;
       push_index = length_q;
@@ -272,51 +273,47 @@ module openecho_inflection
   );
 
   openecho_fifo #(
-      .WIDTH(2 * DEN_W),
+      .WIDTH(2 * Y_W),
       .DEPTH(QUEUE)
   ) u_operands (
       .clk,
       .rst,
       .s_valid(operand_push),
       .s_ready(unused_operand_ready),
-      .s_data ({push_num, push_den}),
+      .s_data ({push_y, push_next}),
       .m_valid(operand_valid),
       .m_ready(operand_ready),
-      .m_data ({operand_num, operand_den}),
+      .m_data ({operand_y, operand_next}),
       .level  (unused_operand_level)
   );
 
-  // ---- divide, and put the component together -----------------------------------------------------------------------
-  logic quotient_valid, quotient_ready, m_free;
-  logic [FRAC:0] quotient;  // one bit below FRAC, for rounding
-  logic half_bin;
+  // ---- interpolate, and put the component together ------------------------------------------------------------------
+  logic position_valid, m_free;
   logic [POSITION_W-1:0] position;
 
-  openecho_divide #(
-      .DEN_W (DEN_W),
-      .QUO_W (FRAC + 1),
-      .STAGES((FRAC + DIVIDE_LOOPS) / DIVIDE_LOOPS)
-  ) u_divide (
+  openecho_interpolate #(
+      .EXP_W(EXP_W),
+      .FRAC(FRAC),
+      .MAX_SAMPLES(MAX_SAMPLES),
+      .VALUE_W(SECOND_W)
+  ) u_interpolate (
       .clk,
       .rst,
       .s_valid(operand_valid),
       .s_ready(operand_ready),
-      .s_head(operand_num),
-      .s_tail({(FRAC + 1) {1'b0}}),
-      .s_den(operand_den),
-      .m_valid(quotient_valid),
-      .m_ready(quotient_ready),
-      .m_quotient(quotient)
+      .s_y(SECOND_W'(operand_y) << EMPTY_W),
+      .s_y_next(SECOND_W'(operand_next) << EMPTY_W),
+      .s_base_valid(note_valid && kind != FINISH),
+      .s_index(index[INDEX_W-1:0]),
+      .s_half((kind == PEAK) != EVEN),
+      .m_valid(position_valid),
+      .m_ready(m_free),
+      .m_position(position)
   );
 
   assign {kind, index, note_maximum, flags} = note;
   assign m_free = !m_valid || m_ready;
-  assign note_pop = m_free && (kind == FINISH || quotient_valid);
-  assign quotient_ready = note_valid && m_free && kind != FINISH;
-
-  assign half_bin = (kind == PEAK) != EVEN;
-  assign position = {index[INDEX_W-1:0], half_bin ? HALF_BIN : FRAC'(0)}
-                  + POSITION_W'(quotient[FRAC:1]) + POSITION_W'(quotient[0]);
+  assign note_pop = m_free && (kind == FINISH || position_valid);
 
   always_ff @(posedge clk) begin
     if (rst) m_valid <= 1'b0;

@@ -4,23 +4,22 @@ module openecho_output
   import openecho_pkg::*;
 #(
     parameter int SAMPLE_W = 11,
+    parameter int EXP_W = 0,
     parameter int FRAC = 16,
     parameter int MAX_SAMPLES = 4096,
-    localparam int AMP_W = SAMPLE_W + AMP_FRAC,
-    localparam int POSITION_W = $clog2(MAX_SAMPLES) + FRAC,
-    localparam int PEAK_W = POSITION_W > AMP_W ? POSITION_W : AMP_W,
-    localparam int WORD_W = record_word_width(SAMPLE_W, FRAC, MAX_SAMPLES)
+    localparam int VALUE_W = value_width(SAMPLE_W, EXP_W, FRAC, MAX_SAMPLES),
+    localparam int WORD_W = record_word_width(SAMPLE_W, EXP_W, FRAC, MAX_SAMPLES)
 ) (
     input  logic                                  clk,
     input  logic                                  rst,
     input  logic                                  s_valid,
     output logic                                  s_ready,
     input  logic                                  s_last,
-    input  logic        [         POSITION_W-1:0] s_centre,
-    input  logic        [             PEAK_W-1:0] s_peak,
-    input  logic        [         POSITION_W-1:0] s_width,
-    input  logic signed [           POSITION_W:0] s_time,
-    input  logic        [              AMP_W-1:0] s_amplitude,
+    input  logic        [            VALUE_W-1:0] s_centre,
+    input  logic        [            VALUE_W-1:0] s_peak,
+    input  logic        [            VALUE_W-1:0] s_width,
+    input  logic signed [            VALUE_W-1:0] s_time,
+    input  logic        [            VALUE_W-1:0] s_amplitude,
     input  logic        [            FLAGS_W-1:0] s_flags,
     output logic                                  m_valid,
     input  logic                                  m_ready,
@@ -29,6 +28,7 @@ module openecho_output
 );
   openecho_check #(
       .SAMPLE_W(SAMPLE_W),
+      .EXP_W(EXP_W),
       .FRAC(FRAC),
       .MAX_SAMPLES(MAX_SAMPLES)
   ) u_check ();
@@ -56,10 +56,10 @@ module openecho_output
     m_record[WORD_HEADER*WORD_W+HEADER_TRAILER] = s_last;
     m_record[WORD_SEQUENCE*WORD_W+:SEQUENCE_W] = sequence_q;
     m_record[WORD_NUMBER*WORD_W+:NUMBER_W] = number_q;
-    m_record[WORD_CENTRE*WORD_W+:POSITION_W] = s_centre;
-    m_record[WORD_PEAK*WORD_W+:PEAK_W] = s_peak;
-    m_record[WORD_WIDTH*WORD_W+:POSITION_W] = s_width;
+    m_record[WORD_CENTRE*WORD_W+:VALUE_W] = s_centre;
+    m_record[WORD_PEAK*WORD_W+:VALUE_W] = s_peak;
+    m_record[WORD_WIDTH*WORD_W+:VALUE_W] = s_width;
     m_record[WORD_TIME*WORD_W+:WORD_W] = WORD_W'(s_time);
-    m_record[WORD_AMPLITUDE*WORD_W+:AMP_W] = s_amplitude;
+    m_record[WORD_AMPLITUDE*WORD_W+:VALUE_W] = s_amplitude;
   end
 endmodule

@@ -66,6 +66,34 @@ package openecho_pkg;
     response_width = sample_w + $clog2((positive > negative ? positive : negative) + 1) + 1;
   endfunction
 
+  // ---- arithmetic -------------------------------------------------------------------------------------------------
+  // EXP_W = 0: positions are unsigned fixed point, in bins with FRAC fraction bits. Otherwise differences, positions,
+  // widths, times and amplitudes are IEEE-754 words with EXP_W exponent and FRAC fraction bits. A word is declared
+  // signed: its sign bit is where a two's complement integer has it, so that a comparison with zero is the same in both.
+  localparam int TAP_FRAC = 11;  // Zhou 2022, Eq (11): taps are integers times 2^-11; float words are scaled so
+
+  function automatic int float_width(input int exp_w, input int frac);
+    float_width = 1 + exp_w + frac;
+  endfunction
+
+  // Bits of the first (order 1) or second difference between modules.
+  function automatic int difference_width(input logic [TAPS_W-1:0] taps, input int count, input int order,
+                                          input int sample_w, input int exp_w, input int frac);
+    difference_width = exp_w > 0 ? float_width(exp_w, frac) : response_width(taps, count, order, sample_w);
+  endfunction
+
+  // Bits of a position.
+  function automatic int position_width(input int exp_w, input int frac, input int max_samples);
+    position_width = exp_w > 0 ? float_width(exp_w, frac) : $clog2(max_samples) + frac;
+  endfunction
+
+  // Bits of any field of an echo, the signed time among them, or of its waveform's trailer.
+  function automatic int value_width(input int sample_w, input int exp_w, input int frac, input int max_samples);
+    value_width = position_width(exp_w, frac, max_samples) + (exp_w > 0 ? 0 : 1);
+    if (value_width < sample_w + AMP_FRAC) value_width = sample_w + AMP_FRAC;
+    if (value_width < $clog2(max_samples) + 1) value_width = $clog2(max_samples) + 1;
+  endfunction
+
   // ---- flags ------------------------------------------------------------------------------------------------------
   localparam int FLAGS_W = 3;
   // of an echo
@@ -84,18 +112,17 @@ package openecho_pkg;
   localparam int WORD_SEQUENCE = 1;  // waveforms since reset
   localparam int WORD_NUMBER = 2;  // echo number from 0 | echo count
   localparam int WORD_CENTRE = 3;  // bins | length in samples
-  localparam int WORD_PEAK = 4;  // bins | noise mean, counts
+  localparam int WORD_PEAK = 4;  // bins | noise mean, counts with AMP_FRAC fraction bits
   localparam int WORD_WIDTH = 5;  // bins | 0
   localparam int WORD_TIME = 6;  // bins, signed | 0
-  localparam int WORD_AMPLITUDE = 7;  // counts | noise deviation, counts
+  localparam int WORD_AMPLITUDE = 7;  // counts | noise deviation, counts with AMP_FRAC fraction bits
   localparam int HEADER_TRAILER = 31;
   localparam int SEQUENCE_W = 32;
   localparam int NUMBER_W = 16;
 
   // Bits of a record's word: 32 where every field fits, else 64.
-  function automatic int record_word_width(input int sample_w, input int frac, input int max_samples);
-    record_word_width = 64;
-    if ($clog2(max_samples) + frac + 1 <= 32 && sample_w + AMP_FRAC <= 32) record_word_width = 32;
+  function automatic int record_word_width(input int sample_w, input int exp_w, input int frac, input int max_samples);
+    record_word_width = value_width(sample_w, exp_w, frac, max_samples) <= 32 ? 32 : 64;
   endfunction
 
 endpackage

@@ -27,6 +27,8 @@ CORES = {
     "narrowest": Config(sample_w=8, frac=4, max_samples=128, taps=(1, 2, 2, 1)),
     "odd taps": Config(sample_w=10, frac=8, max_samples=1000, taps=(-1, 4, 7, 4, -1)),
     "widest": Config(sample_w=16, frac=24, max_samples=65536, taps=(2**15 - 1,) * 48),
+    "half": Config().in_arithmetic("float16"),
+    "double, widest": Config(sample_w=16, max_samples=65536, taps=(2**15 - 1,) * 48).in_arithmetic("float64"),
 }
 """What the core and its modules are linted with."""
 FORMATS = {"smallest that takes the default integer": (4, 3), "half": (5, 10), "double": (11, 52), "widest": (15, 112)}
@@ -48,7 +50,7 @@ def checks() -> Iterator[tuple[str, Command]]:
     cores = {name: hardware.parameters(config) for name, config in CORES.items()}
     floats = {name: {"EXP_W": str(exp_w), "FRAC_W": str(frac_w)} for name, (exp_w, frac_w) in FORMATS.items()}
     for module in hardware.MODULES.values():
-        choices = floats if "EXP_W" in module.parameters else cores if module.parameters else {"default": {}}
+        choices = floats if "FRAC_W" in module.parameters else cores if module.parameters else {"default": {}}
         for name, values in choices.items():
             chosen = [f"-G{parameter}={values[parameter]}" for parameter in module.parameters]
             flags = ["--lint-only", "-Wall", "-Wpedantic", "--top-module", module.top, *chosen]

@@ -1,7 +1,8 @@
 """Break the RTL one line at a time and count how many of the faults the module benches catch.
 
 The faults are in tb/mutations.toml. Each is put into a scratch copy of the sources, where that test of `make test` runs
-which checks the named module with default parameters on Verilator. The report is build/reports/mutate.json.
+which checks the named module on Verilator, with default parameters or with those that it names. The report is
+build/reports/mutate.json.
 """
 
 from __future__ import annotations
@@ -38,13 +39,14 @@ PASSED, TESTS_FAILED = 0, 1
 
 @dataclass(frozen=True)
 class Mutation:
-    """A fault: `line` of `file` in rtl/ becomes `becomes`, and the module `bench` has to notice."""
+    """A fault: `line` of `file` in rtl/ becomes `becomes`, and the module `bench`, built as `config`, has to notice."""
 
     fault: str
     file: str
     bench: str
     line: str
     becomes: str
+    config: str = "default"
 
 
 def mutations() -> list[Mutation]:
@@ -63,7 +65,7 @@ def mutations() -> list[Mutation]:
     return listed
 
 
-def bench_passes(scratch: Path, bench: str, faulty: bool) -> bool:
+def bench_passes(scratch: Path, bench: str, config: str, faulty: bool) -> bool:
     """Whether a module's tests pass in a scratch copy.
 
     Raises
@@ -71,7 +73,7 @@ def bench_passes(scratch: Path, bench: str, faulty: bool) -> bool:
     RuntimeError
         If they could not be run, or fail on the RTL as it is: then they say nothing about a fault.
     """
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "tb/test_rtl.py", "-k", f"{bench}-verilator-default"]
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "tb/test_rtl.py", "-k", f"{bench}-verilator-{config}"]
     path = os.pathsep.join([str(scratch / "model"), str(scratch)])
     environment = os.environ | {"PYTHONPATH": path}
     run = subprocess.run(
@@ -108,21 +110,21 @@ def main() -> int:
         (SCRATCH / str(number)).mkdir(parents=True, exist_ok=True)
         workers.put(SCRATCH / str(number))
 
-    def passes(bench: str, mutation: Mutation | None) -> tuple[bool, float]:
+    def passes(bench: tuple[str, str], mutation: Mutation | None) -> tuple[bool, float]:
         scratch, start = workers.get(), time.monotonic()
         try:
             renew(scratch, mutation)
-            return bench_passes(scratch, bench, mutation is not None), time.monotonic() - start
+            return bench_passes(scratch, *bench, mutation is not None), time.monotonic() - start
         finally:
             workers.put(scratch)
             progress.advance(task)
 
     # A bench that fails without a fault would kill everything, so each runs on the RTL as it is first.
-    benches = sorted({mutation.bench for mutation in listed})
+    benches = sorted({(mutation.bench, mutation.config) for mutation in listed})
     with Progress() as progress, ThreadPoolExecutor(count) as pool:
         task = progress.add_task("mutations", total=len(benches) + len(listed))
         list(pool.map(lambda bench: passes(bench, None), benches))
-        results = list(pool.map(lambda mutation: passes(mutation.bench, mutation), listed))
+        results = list(pool.map(lambda mutation: passes((mutation.bench, mutation.config), mutation), listed))
 
     rows = [
         asdict(mutation) | {"killed": not survived, "seconds": round(seconds, 1)}

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from openecho import report
+from openecho.golden import ARITHMETICS
 from openecho.hardware import ROOT, bench_names
 from openecho.study import comparison
 
@@ -26,7 +27,7 @@ def main() -> int:
         PICTURE.parent.mkdir(exist_ok=True)
         shutil.copyfile(report.FOLDER / PICTURE.name, PICTURE)
     except FileNotFoundError as error:
-        print(f"error: no {error.filename}: run make sim and make precision first", file=sys.stderr)
+        print(f"error: no {error.filename}: run make sim, make precision and make synth CLOCK=1 first", file=sys.stderr)
         return 2
     except ValueError as error:
         print(f"error: {error}", file=sys.stderr)
@@ -52,32 +53,67 @@ def table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> list[str]:
 
 
 def modules(content: dict[str, Any]) -> list[str]:
-    """Waveforms, mismatches and cycles of each module."""
-    found = [row["module"] for row in content["rows"]]
-    if found != list(bench_names()):
-        raise ValueError(f"sim.json has {', '.join(found)}, expected every module: run make sim")
-    head = ("module", "simulator", "waveforms", "mismatches", "latency, cycles", "cycles/waveform", "samples/waveform")
+    """Waveforms, mismatches and cycles of each module, and of the core in each arithmetic."""
+    rows = [row for row in content["rows"] if "waveforms" in row]
+    found = [(row["module"], row["arithmetic"]) for row in rows]
+    expected = [*((name, "fixed") for name in bench_names()), *(("core", name) for name in list(ARITHMETICS)[1:])]
+    if found != expected:
+        raise ValueError(f"sim.json has {len(found)} modules, expected all {len(expected)}: run make sim")
+    head = ("module", "arithmetic", "waveforms", "mismatches", "latency, cycles", "cycles/waveform", "samples/waveform")
     return table(
         head,
         (
             (
                 f"`{row['module']}`",
-                row["simulator"],
+                row["arithmetic"],
                 row["waveforms"],
                 row["mismatches"],
                 span(row["latency_cycles"]),
                 f"{row['cycles_per_waveform']:g}",
                 f"{row['samples_per_waveform']:g}",
             )
-            for row in content["rows"]
+            for row in rows
         ),
     )
+
+
+def units(content: dict[str, Any]) -> list[str]:
+    """Cycles of each float unit in each format."""
+    rows = [row for row in content["rows"] if "results" in row]
+    floats = list(ARITHMETICS)[1:]
+    by_unit: dict[str, dict[str, Any]] = {}
+    for row in rows:
+        by_unit.setdefault(" ".join(filter(None, (f"`{row['module']}`", row["form"]))), {})[row["arithmetic"]] = row
+    if not all(list(by_format) == floats for by_format in by_unit.values()):
+        raise ValueError(f"sim.json lacks some float units, expected all in {', '.join(floats)}: run make sim")
+    head = ["unit", "mismatches", *(f"latency, {name}" for name in floats), f"cycles/result, {floats[-1]}"]
+    cells = []
+    for unit, by_format in by_unit.items():
+        wrong, results = (sum(row[name] for row in by_format.values()) for name in ("mismatches", "results"))
+        latencies = [span(row["latency_cycles"]) for row in by_format.values()]
+        cells.append((unit, f"{wrong} of {results:,}", *latencies, f"{by_format[floats[-1]]['cycles_per_result']:.1f}"))
+    return table(head, cells)
 
 
 def span(latency: dict[str, int]) -> str:
     """Least to greatest latency."""
     least, most = latency["min"], latency["max"]
     return str(least) if least == most else f"{least} to {most}"
+
+
+def area(content: dict[str, Any]) -> list[str]:
+    """Area of every module, of the core in each arithmetic, and of the widest float units; clocks where measured."""
+    rows = [row for row in content["rows"] if not row["module"].startswith("float_") or row["name"].endswith("float64")]
+    if not {"core", "core float64", "float_serial float64"} <= {row["name"] for row in rows if "lut" in row}:
+        raise ValueError("synth.json lacks some builds, expected all: run make synth CLOCK=1")
+    head = ("build", "LUT", "of them RAM and SRL", "FF", "DSP", "ECP5, MHz")
+    return table(
+        head,
+        (
+            (row["name"], row["lut"], row["lut_ram"] + row["srl"], row["ff"], row["dsp"], row.get("mhz_median", ""))
+            for row in rows
+        ),
+    )
 
 
 def precision(content: dict[str, Any]) -> list[str]:
@@ -101,15 +137,23 @@ def precision(content: dict[str, Any]) -> list[str]:
 
 
 def differences(content: dict[str, Any]) -> list[str]:
-    """Largest differences between the core and float64."""
-    largest = content["largest_difference"]
+    """Largest differences between the core in each arithmetic and float64."""
+    cores = content["arithmetics"]
+    if list(cores) != list(ARITHMETICS):
+        raise ValueError(
+            f"core_vs_float64.json has {', '.join(cores)}, expected {', '.join(ARITHMETICS)}: run make sim"
+        )
     unit = dict.fromkeys(comparison.QUANTITIES, "bin") | {"amplitude": "count", "rmse": "count"}
-    rows = [(f"{name}, {unit[name]}", f"{value:.1e}") for name, value in largest.items()]
-    lost = f"{content['lost_by_five_states']} of {content['echoes']}"
+    rows = [
+        (f"{name}, {unit[name]}", *(f"{core['largest_difference'][name]:.1e}" for core in cores.values()))
+        for name in unit
+    ]
+    differing = ", ".join(str(core["differing_waveforms"]) for core in cores.values())
+    lost = f"{cores['fixed']['lost_by_five_states']} of {cores['fixed']['echoes']}"
     return [
-        *table(("largest difference", "core − float64"), rows),
+        *table(("largest difference from float64", *cores), rows),
         "",
-        f"Waveforms with other echoes than float64: {content['differing_waveforms']}.",
+        f"Waveforms with other echoes than float64: {differing}.",
         f"Echoes that the paper's state machine would lose, as they follow closely on another: {lost}.",
     ]
 
@@ -121,7 +165,7 @@ def echoes(content: dict[str, Any]) -> list[str]:
         f"{name} {side}" for name in ("centre", "width", "amplitude", "time", "RMSE") for side in ("core", "float64")
     ]
     rows = []
-    for number, waveform in enumerate(content["waveforms"]):
+    for number, waveform in enumerate(content["arithmetics"]["fixed"]["waveforms"]):
         for at, pair in enumerate(zip(waveform["core"], waveform["float64"], strict=True)):
             cells = [f"{echo[name]:.5f}" for name in ("centre", "width", "amplitude", "time") for echo in pair]
             fits = [f"{waveform['rmse'][side]:.3f}" for side in ("core", "float64")] if at == 0 else ["", ""]
@@ -131,6 +175,8 @@ def echoes(content: dict[str, Any]) -> list[str]:
 
 PARTS: dict[str, tuple[str, Callable[[dict[str, Any]], list[str]]]] = {
     "modules": ("sim", modules),
+    "units": ("sim", units),
+    "area": ("synth", area),
     "precision": ("precision", precision),
     "differences": ("core_vs_float64", differences),
     "echoes": ("core_vs_float64", echoes),

@@ -1,4 +1,7 @@
-"""Simulate RTL modules on lidar waveforms, compare every transfer with the golden model, and measure."""
+"""Simulate RTL modules on lidar waveforms, compare every transfer with the golden model, and measure.
+
+Float units are simulated beside them, on operands of their own: their latencies belong in the same table.
+"""
 
 from __future__ import annotations
 
@@ -24,12 +27,18 @@ from rich.table import Table
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from openecho import formats, golden, report, stimulus
+from openecho.golden import ARITHMETICS
 from openecho.hardware import ROOT, bench_names
 from openecho.study import comparison, figure
 from tb.env import runner
 from tb.env.run import Run
+from tb.float import bench
+from tb.float.lanes import SHOWN, Lane
 
-CONFIG = golden.Config()
+CONFIGS = {name: golden.Config().in_arithmetic(name) for name in ARITHMETICS}
+UNITS = tuple(dict.fromkeys(lane.module for lane in SHOWN))
+VECTORS = 10_000
+"""Operands that a float unit gets."""
 RUNS = ROOT / "build" / "runs" / "sim"
 POLL = 0.1
 """Seconds between two looks at the progress of a simulation."""
@@ -39,9 +48,13 @@ SLOWEST = 300
 
 @dataclass(frozen=True)
 class Job:
-    """What was asked for."""
+    """What was asked for.
 
-    modules: tuple[str, ...]
+    `modules` and `units` name rows of the module table with the arithmetic that they are built for.
+    """
+
+    modules: tuple[tuple[str, str], ...]
+    units: tuple[Lane, ...]
     simulator: str
     waveforms: formats.Waveforms
     recorded: bool
@@ -62,14 +75,14 @@ def parse(arguments: list[str]) -> Job:
         One line with what was found and what was expected.
     """
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--module", help=f"one of {', '.join(bench_names())}; all if left out")
+    parser.add_argument("--module", help=f"one of {', '.join((*bench_names(), *UNITS))}; all if left out")
+    parser.add_argument("--arith", help=f"one of {', '.join(ARITHMETICS)}; if left out, fixed, and the core in all")
     parser.add_argument("--sim", help=f"one of {', '.join(runner.SIMULATORS)}; Verilator if left out")
     parser.add_argument("--data", help="waveforms to use, .npz or .npy; the 40 reference waveforms if left out")
     parser.add_argument("--seed", default="0", help="of the reference waveforms")
     parser.add_argument("--waves", action="store_true", help="record every signal in an FST file")
     options = parser.parse_args(arguments)
-    if options.module not in (None, *bench_names()):
-        raise UsageError(f"MODULE: found {options.module!r}, expected one of {', '.join(bench_names())}")
+    modules, units = plan(options.module, options.arith)
     if options.sim not in (None, *runner.SIMULATORS):
         raise UsageError(f"SIM: found {options.sim!r}, expected one of {', '.join(runner.SIMULATORS)}")
     if not options.seed.isdecimal():
@@ -80,9 +93,38 @@ def parse(arguments: list[str]) -> Job:
         reference = stimulus.reference_set(int(options.seed))
         waveforms = formats.Waveforms(reference.samples, reference.length)
     else:
-        waveforms = formats.load(options.data, CONFIG.sample_w)
-    modules = (options.module,) if options.module else bench_names()
-    return Job(modules, simulator, waveforms, options.data is not None, int(options.seed), options.waves)
+        waveforms = formats.load(options.data, CONFIGS["fixed"].sample_w)
+    return Job(modules, units, simulator, waveforms, options.data is not None, int(options.seed), options.waves)
+
+
+def plan(module: str | None, arithmetic: str | None) -> tuple[tuple[tuple[str, str], ...], tuple[Lane, ...]]:
+    """What to simulate: modules with their arithmetics, and float units.
+
+    Raises
+    ------
+    UsageError
+        If there is no such module, no such arithmetic, or not both together.
+    """
+    known = (*bench_names(), *UNITS)
+    if module is not None and module not in known:
+        raise UsageError(f"MODULE: found {module!r}, expected one of {', '.join(known)}")
+    if arithmetic is not None and arithmetic not in ARITHMETICS:
+        raise UsageError(f"ARITH: found {arithmetic!r}, expected one of {', '.join(ARITHMETICS)}")
+    floats = [name for name in ARITHMETICS if name != "fixed"] if arithmetic is None else [arithmetic]
+    units = tuple(
+        lane for name in floats for lane in SHOWN if lane.arithmetic == name and module in (None, lane.module)
+    )
+    if module in UNITS:
+        if not units:
+            raise UsageError(
+                f"ARITH: found {arithmetic!r}, expected one of {', '.join(list(ARITHMETICS)[1:])} for {module}"
+            )
+        return (), units
+    if module is not None:
+        return ((module, arithmetic or "fixed"),), ()
+    if arithmetic is not None:
+        return tuple((name, arithmetic) for name in bench_names()), units
+    return (*((name, "fixed") for name in bench_names()), *(("core", name) for name in floats)), units
 
 
 def simulate(job: Job, directory: Path, progress: Progress, failures: list[str]) -> Iterator[dict[str, Any]]:
@@ -92,14 +134,14 @@ def simulate(job: Job, directory: Path, progress: Progress, failures: list[str])
     count, samples = len(job.waveforms.length), int(job.waveforms.length.sum())
     task = progress.add_task("", total=count * len(job.modules))
     with ThreadPoolExecutor(1) as pool:
-        for done, module in enumerate(job.modules):
-            home = directory / module
+        for done, (module, arithmetic) in enumerate(job.modules):
+            home, config = directory / f"{module}-{arithmetic}", CONFIGS[arithmetic]
             home.mkdir()
             result, ticks = home / "result.json", home / "progress"
-            run = Run(module, CONFIG, job.seed, str(stored), str(result), str(ticks))
-            progress.update(task, description=f"{module}, building")
-            pool.submit(runner.build, module, CONFIG, job.simulator, job.waves).result()
-            progress.update(task, description=f"{module}, {job.simulator}")
+            run = Run(module, config, job.seed, str(stored), str(result), str(ticks))
+            progress.update(task, description=f"{module}, {arithmetic}, building")
+            pool.submit(runner.build, module, config, job.simulator, job.waves).result()
+            progress.update(task, description=f"{module}, {arithmetic}, {job.simulator}")
             limit = runner.LIMIT + samples / SLOWEST
             future = pool.submit(
                 runner.simulate, run, job.simulator, home, ["tb.env.reference"], waves=job.waves, limit=limit
@@ -114,25 +156,47 @@ def simulate(job: Job, directory: Path, progress: Progress, failures: list[str])
                 if not result.exists():
                     raise
                 failures.append(str(error))
-            row = {"module": module, "simulator": job.simulator, "arithmetic": "fixed"}
+            row = {"module": module, "simulator": job.simulator, "arithmetic": arithmetic}
             yield row | json.loads(result.read_text())
             if job.waves:
                 progress.console.print(f"waves: {home / runner.WAVES}", soft_wrap=True)
 
 
-def show(rows: list[dict[str, Any]], console: Console) -> None:
-    """Print the table."""
+def simulate_units(job: Job, directory: Path, progress: Progress, failures: list[str]) -> Iterator[dict[str, Any]]:
+    """Stream operands through each float unit, yield its row of the report and add to `failures`."""
+    task = progress.add_task("float units", total=len(job.units))
+    for lane in job.units:
+        progress.update(task, description=f"{lane.name}, {job.simulator}")
+        row = bench.measure(lane, VECTORS, job.simulator, directory)
+        if row["mismatches"]:
+            failures.append(
+                f"{lane.name} on {job.simulator}: {row['mismatches']} of {row['results']} results are wrong"
+            )
+        yield {
+            "module": lane.module,
+            "form": lane.form_name,
+            "simulator": job.simulator,
+            "arithmetic": lane.arithmetic,
+        } | row
+        progress.advance(task)
+
+
+def show(title: str, rows: list[dict[str, Any]], console: Console) -> None:
+    """Print the table of the modules, counted in waveforms, or of the float units, counted in results."""
+    if not rows:
+        return
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
-    for column in ("module", "simulator"):
+    for column in (title, "arithmetic"):
         table.add_column(column)
-    for column in ("waveforms", "mismatches", "latency", "cycles/waveform"):
+    counted = "waveform" if "waveforms" in rows[0] else "result"
+    for column in (f"{counted}s", "mismatches", "latency", f"cycles/{counted}"):
         table.add_column(column, justify="right")
     for row in rows:
-        latency, cycles, wrong = row["latency_cycles"], row["cycles_per_waveform"], row["mismatches"]
+        latency, cycles, wrong = row["latency_cycles"], row[f"cycles_per_{counted}"], row["mismatches"]
         table.add_row(
-            row["module"],
-            row["simulator"],
-            str(row["waveforms"]),
+            " ".join(filter(None, (row["module"], row.get("form")))),
+            row["arithmetic"],
+            str(row[f"{counted}s"]),
             f"[bold red]{wrong}" if wrong else "0",
             f"{latency['min']} to {latency['max']}" if latency else "none",
             f"{cycles:.1f}" if cycles else "none",
@@ -140,17 +204,24 @@ def show(rows: list[dict[str, Any]], console: Console) -> None:
     console.print(table)
 
 
-def report_core(job: Job, directory: Path, console: Console) -> None:
-    """Write what the core's records are compared with and drawn from, on the reference waveforms."""
-    records = golden.decode_records(np.load(directory / "core" / "result.npy"), CONFIG)
-    waveforms = job.waveforms
-    compared = comparison.compare(records, waveforms.samples, waveforms.length, CONFIG)
-    tools = runner.tool_versions(job.simulator)
-    console.print(report.write("core_vs_float64", {"tools": tools, "seed": job.seed} | compared), soft_wrap=True)
-    picture = report.FOLDER / "core.png"
-    rows = {"land": 0, "ocean": stimulus.WAVEFORMS}
-    figure.draw(picture, records, waveforms.samples, waveforms.length, CONFIG, rows)
-    console.print(picture, soft_wrap=True)
+def report_cores(job: Job, directory: Path, console: Console) -> None:
+    """Write what the records of each core are compared with and drawn from, on the reference waveforms."""
+    samples, length = job.waveforms.samples, job.waveforms.length
+    compared = {}
+    for module, arithmetic in job.modules:
+        if module != "core":
+            continue
+        config = CONFIGS[arithmetic]
+        records = golden.decode_records(np.load(directory / f"core-{arithmetic}" / "result.npy"), config)
+        compared[arithmetic] = comparison.compare(records, samples, length, config)
+        if arithmetic == "fixed":
+            picture = report.FOLDER / "core.png"
+            rows = {"land": 0, "ocean": stimulus.WAVEFORMS}
+            figure.draw(picture, records, samples, length, config, rows)
+            console.print(picture, soft_wrap=True)
+    if compared:
+        content = {"tools": runner.tool_versions(job.simulator), "seed": job.seed, "arithmetics": compared}
+        console.print(report.write("core_vs_float64", content), soft_wrap=True)
 
 
 def main() -> int:
@@ -172,21 +243,24 @@ def main() -> int:
     directory = Path(tempfile.mkdtemp(prefix=f"{job.simulator}-", dir=RUNS))
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
     rows: list[dict[str, Any]] = []
+    units: list[dict[str, Any]] = []
     failures: list[str] = []
     try:
         with Progress(*columns, console=console) as progress:
             rows += simulate(job, directory, progress, failures)
-    except runner.SimulationError as error:
+            units += simulate_units(job, directory, progress, failures)
+    except (runner.SimulationError, bench.BenchError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
-    show(rows, console)
+    show("module", rows, console)
+    show("float unit", units, console)
     tools = {"python": platform.python_version()} | runner.tool_versions(job.simulator)
-    console.print(report.write("sim", {"tools": tools, "seed": job.seed, "rows": rows}), soft_wrap=True)
+    console.print(report.write("sim", {"tools": tools, "seed": job.seed, "rows": rows + units}), soft_wrap=True)
     if failures:
         print("\n".join(f"error: {failure}" for failure in failures), file=sys.stderr)
         return 1
-    if "core" in job.modules and not job.recorded:
-        report_core(job, directory, console)
+    if not job.recorded:
+        report_cores(job, directory, console)
     if not job.waves:
         shutil.rmtree(directory)
     return 0

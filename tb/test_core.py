@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from openecho import formats, golden, stimulus
-from openecho.golden import Config
+from openecho.golden import ARITHMETICS, Config
 from openecho.study import comparison, precision
 from tb.env import runner
 from tb.env.run import Run
@@ -23,6 +23,14 @@ SLICE = 50
 
 LIMITS = {"centre": 2**-15, "peak": 2**-15, "width": 2**-15, "time": 2**-14, "amplitude": 2**-6}
 """Largest difference from float64 at FRAC 16, in bins and counts."""
+
+FLOATS = tuple(name for name in ARITHMETICS if name != "fixed")
+PLACES = {"centre": 1.5, "peak": 1, "width": 1.1, "time": 2.7}
+"""Largest difference of floats from float64 on the reference waveforms, in last places of a position from 512 to 1023.
+
+The base and the position are rounded to half a place each, the centre once more; the width is half the difference of
+two positions, and 0.59 times that is taken off the centre for the time.
+"""
 
 RTL_POINTS = tuple(
     point for point in precision.POINTS if point.matched and (point.width, point.amplitude) in ((3, 200), (8, 20))
@@ -66,6 +74,37 @@ def test_core_agrees_with_float64_on_the_reference_waveforms(tmp_path: Path) -> 
     assert compared["differing_waveforms"] == 0
     over = {name: compared["largest_difference"][name] for name in LIMITS}
     assert all(over[name] <= limit for name, limit in LIMITS.items()), over
+
+
+@pytest.mark.arithmetic("float64")
+def test_float64_core_finds_the_echoes_of_the_fixed_point_core(tmp_path: Path) -> None:
+    made = stimulus.reference_set(0)
+    echoes = []
+    for name in ("fixed", "float64"):
+        (tmp_path / name).mkdir()
+        config = Config().in_arithmetic(name)
+        records, _ = decomposed(made.samples, made.length, config, tmp_path / name)
+        echoes.append(records[~records["trailer"]])
+    for field in ("sequence", "number", "flags"):
+        np.testing.assert_array_equal(echoes[0][field], echoes[1][field])
+    assert np.abs(echoes[0]["centre"] - echoes[1]["centre"]).max() <= 2**-15
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.arithmetic(name)) for name in FLOATS])
+def test_float_core_takes_the_reference_waveforms_without_a_stall_and_is_as_exact_as_its_format(
+    name: str, tmp_path: Path
+) -> None:
+    made, config = stimulus.reference_set(0), Config().in_arithmetic(name)
+    records, measured = decomposed(made.samples, made.length, config, tmp_path)
+    assert measured["cycles_per_waveform"] == measured["samples_per_waveform"]
+    compared = comparison.compare(records, made.samples, made.length, config)
+    assert compared["differing_waveforms"] == 0
+    place = 2.0 ** (9 - config.frac)
+    # The noise mean is rounded to 2^-8 count, and the amplitude, below 256 counts, to half its last place.
+    limits = {field: places * place for field, places in PLACES.items()}
+    limits["amplitude"] = 2**-9 + 2.0 ** (7 - config.frac - 1)
+    over = {field: compared["largest_difference"][field] for field in limits}
+    assert all(over[field] <= limit for field, limit in limits.items()), over
 
 
 @pytest.mark.parametrize("point", RTL_POINTS, ids=lambda point: f"sigma{point.width}-amplitude{point.amplitude}")

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from openecho import golden
-from openecho.golden import Beats, Config
+from openecho.golden import TAP_FRAC, Beats, Config
 from openecho.golden.floating import Format
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -125,14 +125,33 @@ _ECHOES = ("centre", "peak", "width", "time", "amplitude", "flags")
 _NOISE = Stream("noise", ("mean", "deviation", "none"), last=False)
 _RECORDS = Stream("m", ("record",), words=8)
 _FILTER = ("SAMPLE_W", "MAX_SAMPLES", "TAP_COUNT", "TAPS")
-_POSITIONS = ("SAMPLE_W", "FRAC", "MAX_SAMPLES")
+_POSITIONS = ("SAMPLE_W", "EXP_W", "FRAC", "MAX_SAMPLES")
 _FLOAT = ("EXP_W", "FRAC_W")
-_ALL = ("SAMPLE_W", "FRAC", "MAX_SAMPLES", "TAP_COUNT", "TAPS")
+_ALL = ("SAMPLE_W", "EXP_W", "FRAC", "MAX_SAMPLES", "TAP_COUNT", "TAPS")
+
+
+def _second_difference_latency(config: Config) -> int:
+    """Cycles of `second_difference`: 2, and those of a conversion in floating point."""
+    if config.form is None:
+        return 2
+    built = FloatUnit(config.form, {"INT_W": config.difference_w, "SCALE": -TAP_FRAC})
+    return 2 + _from_int_latency(built)
 
 
 def _parameters_latency(config: Config) -> int:
-    """Cycles of `parameters`: 8, and the rows of its divider, whose ring each quotient passes six times."""
+    """Cycles of `parameters`, fixed point: 8, and the rows of its divider, whose ring each quotient passes six times.
+
+    Floating point: 1, of a trailer; an echo takes longer by what its operations take.
+    """
+    if config.form is not None:
+        return 1
     return 8 + 6 * math.ceil((config.pos_w + 1) / 6)
+
+
+def _core_latency(config: Config) -> int:
+    """Cycles from reader to parameters, which in floating point looks at a beat for one before it takes it."""
+    waits = config.form is not None
+    return 1 + 4 + _second_difference_latency(config) + 3 + waits + _parameters_latency(config)
 
 
 def _levels(width: int) -> int:
@@ -193,11 +212,11 @@ MODULES: dict[str, Module] = {
         ),
         Module(
             name="second_difference",
-            parameters=_FILTER,
+            parameters=_ALL,
             inputs=(Stream("s", _SUMS),),
             outputs=(Stream("m", _DIFFERENCES),),
             golden=golden.second_difference,
-            latency={"m": lambda _: 2},
+            latency={"m": _second_difference_latency},
         ),
         Module(
             name="inflection",
@@ -232,9 +251,11 @@ MODULES: dict[str, Module] = {
             outputs=(_RECORDS,),
             settings=("n", "min_interval", "min_amplitude", "k"),
             golden=golden.core,
-            latency={"m": lambda config: 1 + 4 + 2 + 3 + _parameters_latency(config)},
+            latency={"m": _core_latency},
         ),
-        Module(name="check", parameters=("SAMPLE_W", "FRAC", "MAX_SAMPLES", "TAP_COUNT")),
+        Module(name="check", parameters=("SAMPLE_W", "EXP_W", "FRAC", "MAX_SAMPLES", "TAP_COUNT")),
+        Module(name="interpolate", parameters=("EXP_W", "FRAC", "MAX_SAMPLES")),
+        Module(name="solve", parameters=_POSITIONS),
         Module(name="noise", parameters=("SAMPLE_W", "MAX_SAMPLES")),
         Module(name="divide"),
         Module(name="fifo"),
@@ -273,6 +294,7 @@ def parameters(config: Config) -> dict[str, str]:
     flat = sum((tap & (1 << word) - 1) << word * k for k, tap in enumerate(half))
     return {
         "SAMPLE_W": str(config.sample_w),
+        "EXP_W": str(config.exp_w),
         "FRAC": str(config.frac),
         "MAX_SAMPLES": str(config.max_samples),
         "TAP_COUNT": str(config.tap_count),

@@ -9,8 +9,9 @@ import numpy as np
 import pyuvm
 
 from openecho import golden
-from openecho.golden import Beats, Config
+from openecho.golden import TAP_FRAC, Beats, Config
 from tb.env.bench import ModuleTest
+from tb.env.numbers import decoded, encoded
 from tb.env.waveforms import sensitive
 from tb.modules import second_difference
 
@@ -28,6 +29,8 @@ class WorkedExampleOfThePaper(ModuleTest):
         """Play the four values of the example, scaled to integers, and read the interval that comes out."""
         config = self.config
         scale = ((1 << min(config.first_w, config.second_w) - 2) - 1) / 0.1464
+        # Of a fixed-point position, or of a float between 512 and 1023.
+        last_place = 2.0**-config.frac if config.form is None else 2.0 ** (9 - config.frac)
         second = np.where((np.arange(600) < 537) | (np.arange(600) > 570), 0.01, -0.0001)
         second[[536, 537, 570, 571]] = 0.1464, -0.0005684, -0.05633, 0.05664
         scaled = np.rint(second * scale).astype(np.int64)
@@ -35,8 +38,8 @@ class WorkedExampleOfThePaper(ModuleTest):
         scaled[580:] = 1
         index = np.arange(600)
         beats = {
-            "second": scaled,
-            "first": np.cumsum(scaled) - scaled[:537].sum(),
+            "second": encoded(scaled, TAP_FRAC, config),
+            "first": encoded(np.cumsum(scaled) - scaled[:537].sum(), TAP_FRAC, config),
             "raw": np.zeros_like(index),
             "index": index,
             "overlong": np.zeros_like(index),
@@ -46,9 +49,9 @@ class WorkedExampleOfThePaper(ModuleTest):
         for port, bin_before, crossing in (("left", 536, 0.1464 / 0.1469684), ("right", 570, 0.05633 / 0.11297)):
             values, _, _ = self.bench.scoreboard.channels["m"].values(port)
             # The module takes out the group delay of the filter and the difference; the example does not.
-            found = int(values[0, 0]) / (1 << config.frac) + (config.tap_count + 1) / 2
-            assert abs(found - bin_before - crossing) <= 2 / (1 << config.frac) + 20 / scale, f"{port} is {found}"
-            if config.frac >= 20 and config.second_w >= 24:
+            found = float(decoded(values, config)[0, 0]) + (config.tap_count + 1) / 2
+            assert abs(found - bin_before - crossing) <= 2 * last_place + 20 / scale, f"{port} is {found}"
+            if last_place <= 2**-20 and config.second_w >= 24:
                 assert floor(found * 1e5) / 1e5 == {"left": 536.99613, "right": 570.49862}[port]
 
 

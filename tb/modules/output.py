@@ -32,13 +32,13 @@ class AnyFieldInItsPlace(ModuleTest):
             anything = rng.integers(low, high, count, endpoint=True)
             return np.where(rng.random(count) < 0.2, rng.choice([low, low + 1, high - 1, high], count), anything)
 
-        position, amplitude = (1 << config.pos_w) - 1, (1 << config.amp_w) - 1
+        largest = (1 << config.value_w - 1) - 1
         beats = {
-            "centre": values(0, position),
-            "peak": np.where(last, values(0, amplitude), values(0, position)),
-            "width": np.where(last, 0, values(0, position)),
-            "time": np.where(last, 0, values(-position - 1, position)),
-            "amplitude": values(0, amplitude),
+            "centre": values(0, largest),
+            "peak": values(0, largest),
+            "width": np.where(last, 0, values(0, largest)),
+            "time": np.where(last, 0, values(-largest - 1, largest)),
+            "amplitude": values(0, largest),
             "flags": values(0, 7),
             "last": last,
         }

@@ -10,6 +10,7 @@ import pyuvm
 from openecho import golden
 from openecho.golden import AMP_FRAC, Beats, Config
 from tb.env.bench import ModuleTest, random_pauses
+from tb.env.numbers import encoded, position_frac
 from tb.modules import inflection
 
 
@@ -24,8 +25,8 @@ def random_inputs(config: Config, rng: np.random.Generator, waveforms: int) -> d
     components = rng.integers(0, 6, waveforms)
     last = np.zeros((components + 1).sum(), bool)
     last[np.cumsum(components + 1) - 1] = True
-    full = (1 << config.sample_w) - 1
-    end = (config.max_samples - 1) << config.frac
+    full, frac = (1 << config.sample_w) - 1, position_frac(config)
+    end = (config.max_samples - 1) << frac
 
     def values(high: int, size: int) -> np.ndarray:
         anything = rng.integers(0, high, size, endpoint=True)
@@ -33,15 +34,18 @@ def random_inputs(config: Config, rng: np.random.Generator, waveforms: int) -> d
 
     left, right = np.sort([values(end, last.size), values(end, last.size)], axis=0)
     close = rng.random(last.size) < 0.5
-    right[close] = np.minimum(left[close] + values(60 << config.frac, int(close.sum())), end)
+    right[close] = np.minimum(left[close] + values(60 << frac, int(close.sum())), end)
+    if config.form is not None:
+        # No inflection lies nearer to the start than half a tap set: there the sum of two is never subnormal.
+        left, right = np.maximum(left, 1 << frac), np.maximum(right, 1 << frac)
     # Noise low enough that about half of the components stand out.
     mean, deviation = values(full << AMP_FRAC, waveforms) >> 1, values(full << AMP_FRAC, waveforms) >> 4
     none = rng.integers(0, 1, waveforms, endpoint=True)
     return {
         "s": {
-            "left": np.ma.MaskedArray(left, last),
-            "right": np.ma.MaskedArray(right, last),
-            "peak": np.ma.MaskedArray(values(end, last.size), last),
+            "left": np.ma.MaskedArray(encoded(left, frac, config), last),
+            "right": np.ma.MaskedArray(encoded(right, frac, config), last),
+            "peak": np.ma.MaskedArray(encoded(values(end, last.size), frac, config), last),
             "maximum": np.ma.MaskedArray(values(full, last.size), last),
             "length": np.ma.MaskedArray(rng.integers(1, config.max_samples, last.size, endpoint=True), ~last),
             "flags": np.where(last, rng.integers(0, 4, last.size), rng.integers(0, 8, last.size)),
