@@ -14,7 +14,7 @@ CLOCK  ?=
 VENV   := .venv
 READY  := $(VENV)/.ready
 RUN    := $(VENV)/bin/python
-ARITH_FLAG := $(if $(ARITH),--arith '$(ARITH)')
+ARITH_FLAG := $(if $(ARITH),--arith='$(ARITH)')
 SIM_FLAGS  := $(if $(MODULE),--module '$(MODULE)') $(ARITH_FLAG) $(if $(SIM),--sim '$(SIM)') \
               $(if $(DATA),--data '$(DATA)') $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(WAVES)),--waves)
 

@@ -107,11 +107,11 @@ module openecho_interpolate
     );
 
     // ---- one addition at a time: |y| + |y'|, or base + quotient as soon as there is a quotient -------------------------
-    // The adder is idle, and so ready, whenever it is given something.
-    // A sum is begun only where at most one operation is between its division's start and its position: that one's
-    // quotient goes to the divider's output, the divider takes the sum, and the adder is free for the quotient.
+    // The adder is idle, and so ready, whenever it is given something. A sum is begun only while at most one operation
+    // is in division: its quotient goes to the divider's output, the divider takes the sum, and the adder is free for
+    // the quotient. With two, adder and divider could wait for each other.
     logic adding_q, sum_sent_q, total_is_position_q;
-    logic [1:0] dividing_q;  // operations between
+    logic [1:0] dividing_q;  // operations whose division has begun and whose position has not
     logic add_position, add_valid, unused_add_ready, total_valid, total_taken, quotient_valid, divide_ready;
     logic [POSITION_W-1:0] total, quotient;
     logic [4:0] unused_add_flags, unused_divide_flags;

@@ -1,4 +1,4 @@
-"""`pytest --arith`: tests of one arithmetic, and those that belong to none."""
+"""`pytest --arith=NAME`: tests of one arithmetic, and those that belong to none."""
 
 from __future__ import annotations
 

@@ -46,7 +46,8 @@ ILLEGAL = {
 }
 """Values just outside each parameter's range, and what the sentence that stops elaboration must say."""
 
-ILLEGAL_FLOATS = [
+WIDE = parameters(CONFIGS["wide"])
+ILLEGAL_FLOATS: list[tuple[dict[str, int | str], str]] = [
     ({"EXP_W": 1}, "EXP_W is 1; 0, for fixed point, or exponents of 5 to 11 bits"),
     ({"EXP_W": 4}, "EXP_W is 4; 0, for fixed point, or exponents of 5 to 11 bits"),
     ({"EXP_W": 12}, "EXP_W is 12; 0, for fixed point, or exponents of 5 to 11 bits"),
@@ -54,6 +55,7 @@ ILLEGAL_FLOATS = [
     ({"FRAC": 53}, "FRAC is 53; floating-point fractions of 2 to 52 bits"),
     ({"MAX_SAMPLES": 16385}, "EXP_W 5 ends at 2^15; sums of positions below MAX_SAMPLES 16385 do not fit"),
     ({"SAMPLE_W": 16}, "EXP_W 5 ends at 2^15; amplitudes of SAMPLE_W 16 do not fit"),
+    ({"TAP_COUNT": 48, "TAPS": WIDE["TAPS"]}, "EXP_W 5 ends at 2^15; sums of differences of 29 bits times 2^-11"),
 ]
 """Formats that the core refuses, as changes of a binary16 core, and what the sentence must say."""
 
@@ -112,11 +114,10 @@ def test_illegal_parameter_stops_elaboration_with_a_sentence(parameter: str, sim
 @pytest.mark.parametrize("simulator", runner.SIMULATORS)
 @pytest.mark.parametrize(("changes", "sentence"), ILLEGAL_FLOATS)
 def test_format_that_cannot_work_stops_elaboration_with_a_sentence(
-    changes: dict[str, int], sentence: str, simulator: str, tmp_path: Path
+    changes: dict[str, int | str], sentence: str, simulator: str, tmp_path: Path
 ) -> None:
     need(simulator)
-    values = {"EXP_W": 5, "FRAC": 10} | changes
-    given = parameters(Config()) | {name: str(value) for name, value in values.items()}
+    given = parameters(Config().in_arithmetic("float16")) | {name: str(value) for name, value in changes.items()}
     assert sentence in runner.refusal("core", given, simulator, tmp_path)
 
 

@@ -37,12 +37,20 @@ def assert_refused(run: subprocess.CompletedProcess[str], *said: str) -> None:
     [
         (("--module", "filtre"), ("filtre", "reader, filter")),
         (("--sim", "vcs"), ("vcs", "verilator, icarus")),
+        (("--arith", "float8"), ("float8", "fixed, float16, float32, float64")),
+        (("--module", "float_add", "--arith", "fixed"), ("fixed", "float16, float32, float64 for float_add")),
         (("--seed", "-1"), ("-1", "whole number")),
         (("--data", "nowhere.npz"), ("nowhere.npz", "expected .npz or .npy")),
     ],
 )
 def test_argument_that_is_not_known_is_refused(arguments: tuple[str, ...], said: tuple[str, ...]) -> None:
     assert_refused(sim(*arguments), *said)
+
+
+def test_tests_of_an_arithmetic_that_is_not_known_are_refused() -> None:
+    run = subprocess.run([sys.executable, "-m", "pytest", "--arith=float8"], cwd=ROOT, capture_output=True, check=False)
+    assert run.returncode == 2
+    assert b"error: ARITH: found 'float8', expected one of fixed, float16, float32, float64" in run.stdout + run.stderr
 
 
 def test_counts_wider_than_a_sample_are_refused(tmp_path: Path) -> None:
