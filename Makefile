@@ -5,6 +5,7 @@ MAKEFLAGS += --no-print-directory
 PYTHON ?= python3
 MODULE ?=
 ARITH  ?=
+TAPS   ?=
 SIM    ?=
 DATA   ?=
 SEED   ?=
@@ -15,7 +16,7 @@ VENV   := .venv
 READY  := $(VENV)/.ready
 RUN    := $(VENV)/bin/python
 ARITH_FLAG := $(if $(ARITH),--arith='$(ARITH)')
-SIM_FLAGS  := $(if $(MODULE),--module '$(MODULE)') $(ARITH_FLAG) $(if $(SIM),--sim '$(SIM)') \
+SIM_FLAGS  := $(if $(MODULE),--module '$(MODULE)') $(ARITH_FLAG) $(if $(TAPS),--taps='$(TAPS)') $(if $(SIM),--sim '$(SIM)') \
               $(if $(DATA),--data '$(DATA)') $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(WAVES)),--waves)
 
 .PHONY: help sim test vectors lint format mutate synth precision readme clean
@@ -23,7 +24,7 @@ SIM_FLAGS  := $(if $(MODULE),--module '$(MODULE)') $(ARITH_FLAG) $(if $(SIM),--s
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-sim: $(READY) ## simulate all against their models [MODULE=] [ARITH=] [SIM=verilator|icarus] [DATA=file.npz] [SEED=] [WAVES=1]
+sim: $(READY) ## simulate all against their models [MODULE=] [ARITH=] [TAPS=] [SIM=verilator|icarus] [DATA=file.npz] [SEED=] [WAVES=1]
 	@$(RUN) scripts/sim.py $(SIM_FLAGS)
 
 test: $(READY) ## run all tests: the model's and the RTL's, on every simulator found [ARITH=fixed|float16|float32|float64]

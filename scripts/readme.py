@@ -57,8 +57,8 @@ def modules(content: dict[str, Any]) -> list[str]:
     rows = [row for row in content["rows"] if "waveforms" in row]
     found = [(row["module"], row["arithmetic"]) for row in rows]
     expected = [*((name, "fixed") for name in bench_names()), *(("core", name) for name in list(ARITHMETICS)[1:])]
-    if found != expected:
-        raise ValueError(f"sim.json has {len(found)} modules, expected all {len(expected)}: run make sim")
+    if found != expected or content["taps"] != "paper":
+        raise ValueError(f"sim.json has {len(found)} modules, expected all {len(expected)} and no TAPS: run make sim")
     head = ("module", "arithmetic", "waveforms", "mismatches", "latency, cycles", "cycles/waveform", "samples/waveform")
     return table(
         head,

@@ -27,7 +27,7 @@ from rich.table import Table
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from openecho import formats, golden, report, stimulus
-from openecho.golden import ARITHMETICS
+from openecho.golden import ARITHMETICS, TAP_SETS
 from openecho.hardware import ROOT, bench_names
 from openecho.study import comparison, figure
 from tb.env import runner
@@ -35,7 +35,6 @@ from tb.env.run import Run
 from tb.float import bench
 from tb.float.lanes import SHOWN, Lane
 
-CONFIGS = {name: golden.Config().in_arithmetic(name) for name in ARITHMETICS}
 UNITS = tuple(dict.fromkeys(lane.module for lane in SHOWN))
 VECTORS = 10_000
 """Operands that a float unit gets."""
@@ -55,11 +54,16 @@ class Job:
 
     modules: tuple[tuple[str, str], ...]
     units: tuple[Lane, ...]
+    taps: str
     simulator: str
     waveforms: formats.Waveforms
     recorded: bool
     seed: int
     waves: bool
+
+    def config(self, arithmetic: str) -> golden.Config:
+        """What a module is built with and set to."""
+        return golden.Config(taps=TAP_SETS[self.taps]).in_arithmetic(arithmetic)
 
 
 class UsageError(ValueError):
@@ -77,12 +81,15 @@ def parse(arguments: list[str]) -> Job:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--module", help=f"one of {', '.join((*bench_names(), *UNITS))}; all if left out")
     parser.add_argument("--arith", help=f"one of {', '.join(ARITHMETICS)}; if left out, fixed, and the core in all")
+    parser.add_argument("--taps", default="paper", help=f"one of {', '.join(TAP_SETS)}; the paper's if left out")
     parser.add_argument("--sim", help=f"one of {', '.join(runner.SIMULATORS)}; Verilator if left out")
     parser.add_argument("--data", help="waveforms to use, .npz or .npy; the 40 reference waveforms if left out")
     parser.add_argument("--seed", default="0", help="of the reference waveforms")
     parser.add_argument("--waves", action="store_true", help="record every signal in an FST file")
     options = parser.parse_args(arguments)
     modules, units = plan(options.module, options.arith)
+    if options.taps not in TAP_SETS:
+        raise UsageError(f"TAPS: found {options.taps!r}, expected one of {', '.join(TAP_SETS)}")
     if options.sim not in (None, *runner.SIMULATORS):
         raise UsageError(f"SIM: found {options.sim!r}, expected one of {', '.join(runner.SIMULATORS)}")
     if not options.seed.isdecimal():
@@ -93,8 +100,10 @@ def parse(arguments: list[str]) -> Job:
         reference = stimulus.reference_set(int(options.seed))
         waveforms = formats.Waveforms(reference.samples, reference.length)
     else:
-        waveforms = formats.load(options.data, CONFIGS["fixed"].sample_w)
-    return Job(modules, units, simulator, waveforms, options.data is not None, int(options.seed), options.waves)
+        waveforms = formats.load(options.data, golden.Config().sample_w)
+    return Job(
+        modules, units, options.taps, simulator, waveforms, options.data is not None, int(options.seed), options.waves
+    )
 
 
 def plan(module: str | None, arithmetic: str | None) -> tuple[tuple[tuple[str, str], ...], tuple[Lane, ...]]:
@@ -135,7 +144,7 @@ def simulate(job: Job, directory: Path, progress: Progress, failures: list[str])
     task = progress.add_task("", total=count * len(job.modules))
     with ThreadPoolExecutor(1) as pool:
         for done, (module, arithmetic) in enumerate(job.modules):
-            home, config = directory / f"{module}-{arithmetic}", CONFIGS[arithmetic]
+            home, config = directory / f"{module}-{arithmetic}", job.config(arithmetic)
             home.mkdir()
             result, ticks = home / "result.json", home / "progress"
             run = Run(module, config, job.seed, str(stored), str(result), str(ticks))
@@ -211,7 +220,7 @@ def report_cores(job: Job, directory: Path, console: Console) -> None:
     for module, arithmetic in job.modules:
         if module != "core":
             continue
-        config = CONFIGS[arithmetic]
+        config = job.config(arithmetic)
         records = golden.decode_records(np.load(directory / f"core-{arithmetic}" / "result.npy"), config)
         compared[arithmetic] = comparison.compare(records, samples, length, config)
         if arithmetic == "fixed":
@@ -220,7 +229,12 @@ def report_cores(job: Job, directory: Path, console: Console) -> None:
             figure.draw(picture, records, samples, length, config, rows)
             console.print(picture, soft_wrap=True)
     if compared:
-        content = {"tools": runner.tool_versions(job.simulator), "seed": job.seed, "arithmetics": compared}
+        content = {
+            "tools": runner.tool_versions(job.simulator),
+            "seed": job.seed,
+            "taps": job.taps,
+            "arithmetics": compared,
+        }
         console.print(report.write("core_vs_float64", content), soft_wrap=True)
 
 
@@ -255,7 +269,9 @@ def main() -> int:
     show("module", rows, console)
     show("float unit", units, console)
     tools = {"python": platform.python_version()} | runner.tool_versions(job.simulator)
-    console.print(report.write("sim", {"tools": tools, "seed": job.seed, "rows": rows + units}), soft_wrap=True)
+    console.print(
+        report.write("sim", {"tools": tools, "seed": job.seed, "taps": job.taps, "rows": rows + units}), soft_wrap=True
+    )
     if failures:
         print("\n".join(f"error: {failure}" for failure in failures), file=sys.stderr)
         return 1

@@ -132,6 +132,7 @@ def test_package_and_model_state_the_same_constants() -> None:
     for name in ("SATURATED", "TRUNCATED", "NO_PEAK", "TOO_SHORT", "TOO_LONG", "NO_NOISE"):
         assert 1 << rtl[f"FLAG_{name}"] == getattr(golden, name)
     assert rtl["PAPER_TAP_COUNT"] == len(golden.PAPER_TAPS)
+    assert rtl["MAX_TAPS"] == golden.MAX_TAPS
 
 
 def test_every_file_of_rtl_is_in_the_module_table() -> None:

@@ -37,6 +37,7 @@ def assert_refused(run: subprocess.CompletedProcess[str], *said: str) -> None:
     [
         (("--module", "filtre"), ("filtre", "reader, filter")),
         (("--sim", "vcs"), ("vcs", "verilator, icarus")),
+        (("--taps", "wide"), ("wide", "paper, gedi, lvis, nasa3.5, nasa6.5")),
         (("--arith", "float8"), ("float8", "fixed, float16, float32, float64")),
         (("--module", "float_add", "--arith", "fixed"), ("fixed", "float16, float32, float64 for float_add")),
         (("--seed", "-1"), ("-1", "whole number")),

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from openecho.golden import PAPER_TAPS, Config, filter, second_difference
+from openecho.golden import MAX_TAPS, PAPER_TAPS, TAP_SETS, Config, filter, gaussian_taps, second_difference
 from openecho.golden.floating import Format
 
 
@@ -102,3 +102,22 @@ def test_widths_hold_the_worst_waveform(taps: tuple[int, ...]) -> None:
 def test_illegal_configurations_are_named_in_one_line(settings: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=f"^{message}$"):
         Config(**settings)
+
+
+@pytest.mark.parametrize("name", TAP_SETS)
+def test_named_tap_sets_are_accepted_and_symmetric(name: str) -> None:
+    taps = Config(taps=TAP_SETS[name]).taps
+    assert taps == taps[::-1]
+
+
+@pytest.mark.parametrize("sigma", [2.0, 3.5, 6.5])
+def test_gaussian_taps_have_the_width_that_was_asked_for(sigma: float) -> None:
+    taps = np.array(gaussian_taps(sigma))
+    offset = np.arange(taps.size) - (taps.size - 1) / 2
+    assert taps.size == 2 * round(3.5 * sigma)
+    # Cut at 3.5 σ, a Gaussian has lost 0.6 % of its variance; the taps are whole numbers.
+    assert np.average(offset**2, weights=taps) == pytest.approx(sigma**2, rel=0.01)
+
+
+def test_gaussian_taps_end_where_the_core_takes_no_more() -> None:
+    assert len(gaussian_taps(20.0)) == MAX_TAPS

@@ -20,7 +20,6 @@ from .config import (
     NO_NOISE,
     NO_PEAK,
     NOISE_SAMPLES,
-    PAPER_TAPS,
     RATIO_FRAC,
     ROOT_FRAC,
     SATURATED,
@@ -38,10 +37,12 @@ from .parameters import parameters
 from .reader import reader
 from .records import decode_records
 from .second_difference import second_difference
+from .taps import MAX_TAPS, PAPER_TAPS, TAP_SETS, gaussian_taps
 
 __all__ = [
     "AMP_FRAC",
     "ARITHMETICS",
+    "MAX_TAPS",
     "NOISE_SAMPLES",
     "NO_NOISE",
     "NO_PEAK",
@@ -50,6 +51,7 @@ __all__ = [
     "ROOT_FRAC",
     "SATURATED",
     "TAP_FRAC",
+    "TAP_SETS",
     "TOO_LONG",
     "TOO_SHORT",
     "TRUNCATED",
@@ -59,6 +61,7 @@ __all__ = [
     "decode_records",
     "filter",
     "float64",
+    "gaussian_taps",
     "inflection",
     "output",
     "parameters",

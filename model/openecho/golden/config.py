@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .floating import BINARY16, BINARY32, BINARY64, Format
+from .taps import MAX_TAPS, PAPER_TAPS
 
 NOISE_SAMPLES = 50
 """Samples at the start of a waveform that measure the noise (Zhou 2022, section 2.1)."""
@@ -29,9 +30,6 @@ ARITHMETICS = {
     "float64": (BINARY64.exp_w, BINARY64.frac_w),
 }
 """`exp_w` and `frac` of each arithmetic that command lines and reports know by name."""
-
-PAPER_TAPS = (43, 55, 69, 84, 99, 114, 127, 138, 146, 150, 150, 146, 138, 127, 114, 99, 84, 69, 55, 43)
-"""The Gaussian of Zhou 2022, Eq (11), as the integers in front of 2⁻¹¹."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +82,7 @@ class Config:
         else:
             _check_integer("exp_w", self.exp_w, 5, 11, "0 or ")
             _check_integer("frac", self.frac, 2, 52)
-        _check_integer("number of taps", len(self.taps), 4, 48)
+        _check_integer("number of taps", len(self.taps), 4, MAX_TAPS)
         for tap in self.taps:
             _check_integer("tap", tap, -(1 << 15), (1 << 15) - 1)
         if self.taps != self.taps[::-1]:
