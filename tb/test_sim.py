@@ -41,7 +41,7 @@ def assert_refused(run: subprocess.CompletedProcess[str], *said: str) -> None:
         (("--arith", "float8"), ("float8", "fixed, float16, float32, float64")),
         (("--module", "float_add", "--arith", "fixed"), ("fixed", "float16, float32, float64 for float_add")),
         (("--seed", "-1"), ("-1", "whole number")),
-        (("--data", "nowhere.npz"), ("nowhere.npz", "expected .npz or .npy")),
+        (("--data", "nowhere.npz"), ("nowhere.npz: no such file", "expected LVIS or GEDI L1B (HDF5)")),
     ],
 )
 def test_argument_that_is_not_known_is_refused(arguments: tuple[str, ...], said: tuple[str, ...]) -> None:

@@ -1,5 +1,7 @@
-"""Recorded waveforms from files: ``.npz`` with the keys `samples` and `length`, or a plain two-dimensional ``.npy``."""
+"""Recorded waveforms from files: `open` hands out blocks of any supported format, `load` reads a whole file."""
 
-from openecho.formats.waveforms import DataError, Waveforms, load
+from openecho.formats.detect import open
+from openecho.formats.recording import Block, DataError, Geolocation, Recording
+from openecho.formats.waveforms import Waveforms, load
 
-__all__ = ["DataError", "Waveforms", "load"]
+__all__ = ["Block", "DataError", "Geolocation", "Recording", "Waveforms", "load", "open"]
