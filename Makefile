@@ -16,16 +16,20 @@ VENV   := .venv
 READY  := $(VENV)/.ready
 RUN    := $(VENV)/bin/python
 ARITH_FLAG := $(if $(ARITH),--arith='$(ARITH)')
-SIM_FLAGS  := $(if $(MODULE),--module '$(MODULE)') $(ARITH_FLAG) $(if $(TAPS),--taps='$(TAPS)') $(if $(SIM),--sim '$(SIM)') \
+TAPS_FLAG  := $(if $(TAPS),--taps='$(TAPS)')
+SIM_FLAGS  := $(if $(MODULE),--module '$(MODULE)') $(ARITH_FLAG) $(TAPS_FLAG) $(if $(SIM),--sim '$(SIM)') \
               $(if $(DATA),--data '$(DATA)') $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(WAVES)),--waves)
 
-.PHONY: help sim test vectors lint format mutate synth precision readme clean
+.PHONY: help sim replay test vectors lint format mutate synth precision readme clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-sim: $(READY) ## simulate all against their models [MODULE=] [ARITH=] [TAPS=] [SIM=verilator|icarus] [DATA=file.npz] [SEED=] [WAVES=1]
+sim: $(READY) ## simulate all against their models [MODULE=] [ARITH=] [TAPS=] [SIM=verilator|icarus] [DATA=file] [SEED=] [WAVES=1]
 	@$(RUN) scripts/sim.py $(SIM_FLAGS)
+
+replay: $(READY) ## run a whole file through the core and compare every record, DATA=file [ARITH=] [TAPS=] [SIM=verilator|icarus]
+	@$(RUN) scripts/replay.py $(if $(DATA),--data '$(DATA)') $(ARITH_FLAG) $(TAPS_FLAG) $(if $(SIM),--sim '$(SIM)')
 
 test: $(READY) ## run all tests: the model's and the RTL's, on every simulator found [ARITH=fixed|float16|float32|float64]
 	@$(RUN) -m pytest -n auto $(ARITH_FLAG)

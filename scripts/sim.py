@@ -83,7 +83,9 @@ def parse(arguments: list[str]) -> Job:
     parser.add_argument("--arith", help=f"one of {', '.join(ARITHMETICS)}; if left out, fixed, and the core in all")
     parser.add_argument("--taps", default="paper", help=f"one of {', '.join(TAP_SETS)}; the paper's if left out")
     parser.add_argument("--sim", help=f"one of {', '.join(runner.SIMULATORS)}; Verilator if left out")
-    parser.add_argument("--data", help="waveforms to use, any file that openecho.formats opens; the 40 reference waveforms if left out")
+    parser.add_argument(
+        "--data", help="waveforms to use, any file that openecho.formats opens; the 40 reference waveforms if left out"
+    )
     parser.add_argument("--seed", default="0", help="of the reference waveforms")
     parser.add_argument("--waves", action="store_true", help="record every signal in an FST file")
     options = parser.parse_args(arguments)
