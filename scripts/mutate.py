@@ -27,7 +27,7 @@ from openecho.hardware import ROOT, RTL
 
 LIST = ROOT / "tb" / "mutations.toml"
 SCRATCH = ROOT / "build" / "mutate"
-COPIED = ("model", "rtl", "tb", "pyproject.toml")
+COPIED = ("model", "rtl", "tb", "conftest.py", "pyproject.toml")
 """What a scratch copy holds: all that the benches read."""
 
 TIMEOUT = 900

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -51,13 +50,11 @@ def decomposed(
 
 
 @pytest.mark.parametrize("name", RECORDED)
-def test_core_equals_its_model_on_recorded_waveforms_without_a_bubble(name: str, tmp_path: Path) -> None:
-    folder = os.environ.get("OPENECHO_DATA")
-    if folder is None:
-        assert "CI" not in os.environ, "CI: OPENECHO_DATA is not set, expected the folder of recorded waveforms"
-        pytest.skip("OPENECHO_DATA names no folder with recorded waveforms")
+def test_core_equals_its_model_on_recorded_waveforms_without_a_bubble(
+    name: str, recorded: Path, tmp_path: Path
+) -> None:
     config = Config()
-    waveforms = formats.load(Path(folder) / name, config.sample_w)
+    waveforms = formats.load(recorded / name, config.sample_w)
     rows = np.linspace(0, len(waveforms.length) - 1, SLICE).astype(int)
     records, measured = decomposed(waveforms.samples[rows], waveforms.length[rows], config, tmp_path)
     assert measured["mismatches"] == 0

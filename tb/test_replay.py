@@ -134,13 +134,9 @@ def test_simulation_that_breaks_off_says_so_and_leaves_nothing(
 
 
 @pytest.mark.parametrize("name", RECORDED)
-def test_recorded_waveforms_give_the_records_of_the_golden_model(name: str) -> None:
-    folder = os.environ.get("OPENECHO_DATA")
-    if folder is None:
-        assert "CI" not in os.environ, "CI: OPENECHO_DATA is not set, expected the folder of recorded waveforms"
-        pytest.skip("OPENECHO_DATA names no folder with recorded waveforms")
+def test_recorded_waveforms_give_the_records_of_the_golden_model(name: str, recorded: Path) -> None:
     config = Config()
-    waveforms = formats.load(Path(folder) / name, config.sample_w)
+    waveforms = formats.load(recorded / name, config.sample_w)
     rows = np.linspace(0, len(waveforms.length) - 1, SLICE).astype(int)
     samples, length = waveforms.samples[rows], waveforms.length[rows]
     replayed = bench.replay(samples, length, config)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 import tracemalloc
 import zipfile
 from collections.abc import Callable
@@ -204,14 +203,11 @@ def test_a_member_that_claims_more_than_deflate_can_hold_is_refused(tmp_path: Pa
 
 
 @pytest.mark.parametrize("name", ["gedi_cerrado.npz", "lvis_arctic.npz", "lvis_tx.npz", "neon_harvard.npz"])
-def test_recorded_files_read_back(name: str) -> None:
-    folder = os.environ.get("OPENECHO_DATA")
-    if folder is None:
-        pytest.skip("OPENECHO_DATA names no folder with recorded waveforms")
-    with np.load(Path(folder) / name) as stored:
+def test_recorded_files_read_back(name: str, recorded: Path) -> None:
+    with np.load(recorded / name) as stored:
         samples, length = stored["samples"], stored["length"]
     row = 0
-    for block in fuzz.read_all(Path(folder) / name):
+    for block in fuzz.read_all(recorded / name):
         for found, expected in zip(block.samples, block.length, strict=True):
             assert expected == length[row]
             np.testing.assert_array_equal(found[:expected], samples[row, :expected])

@@ -1,10 +1,23 @@
-"""`pytest --arith=NAME`: tests of one arithmetic, and those that belong to none."""
+"""What all tests share: recorded waveforms, and `pytest --arith=NAME` for those of one arithmetic."""
 
 from __future__ import annotations
+
+import os
+from pathlib import Path
 
 import pytest
 
 from openecho.golden import ARITHMETICS
+
+
+@pytest.fixture
+def recorded() -> Path:
+    """Folder of recorded waveforms, which are not part of the project; a test without it fails in CI, or is skipped."""
+    folder = os.environ.get("OPENECHO_DATA")
+    if folder is None:
+        assert "CI" not in os.environ, "CI: OPENECHO_DATA is not set, expected the folder of recorded waveforms"
+        pytest.skip("OPENECHO_DATA names no folder with recorded waveforms")
+    return Path(folder)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
