@@ -121,21 +121,6 @@ def test_corrected_width_takes_off_the_variance_of_the_taps() -> None:
     assert float64.corrected_width(np.array([3.0]), even) == pytest.approx([math.sqrt(9 - 1.25)])
 
 
-def test_rmse_is_the_distance_from_the_sum_of_the_echoes() -> None:
-    x = np.arange(120)
-    centre, width, amplitude = (
-        np.array([[30.25], [70.5], [50.0]]),
-        np.array([[4.0], [9.0], [6.0]]),
-        np.full((3, 1), 90.0),
-    )
-    fitted = 7 + amplitude * np.exp(-(((x - centre) / width) ** 2) / 2)
-    samples = np.stack([fitted[0] + fitted[1] - 7, fitted[2] + 3 * (-1.0) ** x, np.full(120, 11.0)])
-    samples[1, 100:] = 2000
-    echoes = {"waveform": np.array([0, 0, 1]), "noise_mean": np.full(3, 7.0)}
-    echoes |= {"centre": centre[:, 0], "width": width[:, 0], "amplitude": amplitude[:, 0]}
-    assert float64.rmse(samples, np.array([120, 100, 120]), echoes) == pytest.approx([0, 3, 4], abs=1e-12)
-
-
 def five_state_machine(signs: str) -> list[tuple[int, int]]:
     """Begin and end of each run of 0 that the machine of Zhou 2022 finds, looking at pair after pair of signs."""
     state, begin, found = "idle", 0, []

@@ -1,7 +1,5 @@
 """The whole method in float64, straight from the equations: what the core is judged against."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from .beats import Array, Beats, BoolArray, FloatArray, IntArray, stream, waveform_of
@@ -136,34 +134,6 @@ def corrected_width(width: FloatArray, config: Config) -> FloatArray:
     offset = np.arange(config.tap_count) - (config.tap_count - 1) / 2
     variance = float(np.average(offset**2, weights=config.taps))
     return (width**2 - variance).clip(0) ** 0.5
-
-
-def rmse(samples: Array, length: Array, echoes: Mapping[str, Array]) -> FloatArray:
-    """Root mean square difference of each raw waveform from its noise mean plus the Gaussians of its echoes.
-
-    Zhou 2022, Eq (12), with the root and the square that its print lost.
-
-    Parameters
-    ----------
-    samples : (n, m) array
-        A waveform a row, counts.
-    length : (n,) integer array
-        Samples that were recorded in each row.
-    echoes : mapping of arrays
-        `waveform`, `centre`, `width`, `amplitude` of each echo and `noise_mean` of each waveform, as from `decompose`.
-
-    Returns
-    -------
-    (n,) float array
-        Counts.
-    """
-    x = np.arange(samples.shape[1])
-    centre, width, amplitude = (echoes[name][:, np.newaxis] for name in ("centre", "width", "amplitude"))
-    fitted: FloatArray = np.repeat(echoes["noise_mean"][:, np.newaxis], x.size, axis=1)
-    np.add.at(fitted, echoes["waveform"], amplitude * np.exp(-((x - centre) ** 2) / (2 * width**2)))
-    recorded = x < length[:, np.newaxis]
-    mean_square: FloatArray = np.mean((samples - fitted) ** 2, axis=1, where=recorded)
-    return mean_square**0.5
 
 
 def _noise(sample: IntArray, starts: IntArray, enough: BoolArray) -> tuple[FloatArray, FloatArray]:

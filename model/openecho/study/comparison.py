@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from openecho import golden
+from openecho.decompose import criteria
 
 QUANTITIES = ("centre", "peak", "width", "time", "amplitude")
 """What is compared of each echo; bins, and counts for the amplitude."""
@@ -37,7 +38,7 @@ def compare(records: np.ndarray, samples: NDArray[Any], length: NDArray[Any], co
         ``echoes``, ``lost_by_five_states``: all of the core's, and those that the paper's state machine would lose.
     """
     sides = {"core": _decomposed(records), "float64": golden.float64.decompose(samples, length, config)}
-    fits = {side: golden.float64.rmse(samples, length, echoes) for side, echoes in sides.items()}
+    fits = {side: _published_rmse(samples, length, echoes) for side, echoes in sides.items()}
     waveforms, differing = [], 0
     largest = dict.fromkeys((*QUANTITIES, "rmse"), 0.0)
     for row, count in enumerate(length):
@@ -67,6 +68,14 @@ def _decomposed(records: np.ndarray) -> dict[str, NDArray[Any]]:
     echoes, trailers = records[~records["trailer"]], records[records["trailer"]]
     columns = {name: echoes[name] for name in QUANTITIES}
     return columns | {"waveform": echoes["sequence"], "noise_mean": trailers["noise_mean"]}
+
+
+def _published_rmse(
+    samples: NDArray[Any], length: NDArray[Any], echoes: dict[str, NDArray[Any]]
+) -> NDArray[np.float64]:
+    """Misfit of each waveform with its echoes where and as wide as Zhou 2022 has them."""
+    fitted = criteria.fitted(echoes, echoes["noise_mean"], samples.shape[1], echoes["centre"], echoes["width"])
+    return criteria.rmse(samples, length, fitted)
 
 
 def _of_waveform(columns: dict[str, NDArray[Any]], row: int) -> dict[str, NDArray[Any]]:
