@@ -2,6 +2,7 @@
 
 from openecho.formats.detect import open
 from openecho.formats.recording import Block, DataError, Geolocation, Recording
+from openecho.formats.references import Reference, references
 from openecho.formats.waveforms import Waveforms, load
 
-__all__ = ["Block", "DataError", "Geolocation", "Recording", "Waveforms", "load", "open"]
+__all__ = ["Block", "DataError", "Geolocation", "Recording", "Reference", "Waveforms", "load", "open", "references"]

@@ -42,6 +42,16 @@ LARGEST_CHUNK = 2**28
 SCANNED = 2**16
 """Shots of which counts and indices are checked at a time when a GEDI granule is opened."""
 
+STEPS = (1e-7, 1e-7, 1e-3)
+"""Degrees, degrees and metres: about a centimetre on the ground and a millimetre of height."""
+
+WGS_84 = (
+    'GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563,AUTHORITY["EPSG","7030"]],'
+    'AUTHORITY["EPSG","6326"]],PRIMEM["Greenwich",0,AUTHORITY["EPSG","8901"]],'
+    'UNIT["degree",0.0174532925199433,AUTHORITY["EPSG","9122"]],AUTHORITY["EPSG","4326"]]'
+)
+"""EPSG 4326 as OGC WKT of 2001, which LAS 1.4 asks for; heights above the ellipsoid have no place in it."""
+
 DEGREES = "longitude (degrees east), latitude (degrees north), elevation (metres above the WGS 84 ellipsoid)"
 
 
@@ -75,12 +85,12 @@ def open_hdf5(path: Path) -> Recording:
 
 
 def _open_lvis(path: Path, file: h5py.File, names: dict[str, str], stack: ExitStack) -> Recording:
-    rxwave = _dataset(path, file, names["rxwave"], 2, None)
+    rxwave = dataset(path, file, names["rxwave"], 2, None)
     waveforms, length = rxwave.shape
     check_waveforms(path, waveforms, length)
 
     def column(name: str) -> h5py.Dataset | None:
-        return _dataset(path, file, names[name], 1, waveforms) if name in names else None
+        return dataset(path, file, names[name], 1, waveforms) if name in names else None
 
     time, shot = column("time"), column("shotnumber")
     last_bin, ends = _lvis_geolocation(path, file, names, waveforms)
@@ -114,6 +124,8 @@ def _open_lvis(path: Path, file: h5py.File, names: dict[str, str], stack: ExitSt
         parts=((None, waveforms),),
         reader=read,
         closer=stack.pop_all().close,
+        resolution=STEPS if ends else None,
+        wkt=WGS_84 if ends else None,
     )
 
 
@@ -134,7 +146,7 @@ def _lvis_geolocation(
             name = f"{axis}{number}"
             if name not in names:
                 raise DataError(f"{path}: no dataset {name.upper()}, expected positions of bins 0 and {last}")
-            side.append(_dataset(path, file, names[name], 1, waveforms))
+            side.append(dataset(path, file, names[name], 1, waveforms))
         sides.append(side)
     return last, (sides[0], sides[1])
 
@@ -182,18 +194,20 @@ def _open_gedi(path: Path, file: h5py.File, names: list[str], stack: ExitStack) 
         parts=tuple((beam.name, beam.shots) for beam in beams),
         reader=read,
         closer=stack.pop_all().close,
+        resolution=STEPS if located else None,
+        wkt=WGS_84 if located else None,
     )
 
 
 def _beam(path: Path, file: h5py.File, name: str) -> _Beam:
     """Datasets of a beam, with every count and start index checked, so that a block can't surprise."""
-    group = _member(path, file, name)
+    group = member(path, file, name)
     if not isinstance(group, h5py.Group):
         raise DataError(f"{path}: {name} is no group, expected a group with rxwaveform")
-    rxwaveform = _dataset(path, group, "rxwaveform", 1, None)
-    count = _dataset(path, group, "rx_sample_count", 1, None, "iu")
+    rxwaveform = dataset(path, group, "rxwaveform", 1, None)
+    count = dataset(path, group, "rx_sample_count", 1, None, "iu")
     shots = len(count)
-    start = _dataset(path, group, "rx_sample_start_index", 1, shots, "iu")
+    start = dataset(path, group, "rx_sample_start_index", 1, shots, "iu")
     total, longest = 0, 0
     for first in range(0, shots, SCANNED):
         rows = slice(first, first + SCANNED)
@@ -237,7 +251,7 @@ def _gedi_geolocation(
     ]
     if not any(name in group for side in sides for name in side):
         return None
-    first, last = ([_dataset(path, group, name, 1, shots) for name in side] for side in sides)
+    first, last = ([dataset(path, group, name, 1, shots) for name in side] for side in sides)
     return first, last
 
 
@@ -265,11 +279,17 @@ def _floats(values: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def _optional(path: Path, group: h5py.Group, name: str, rows: int, kinds: str = "iuf") -> h5py.Dataset | None:
-    return _dataset(path, group, name, 1, rows, kinds) if name in group else None
+    return dataset(path, group, name, 1, rows, kinds) if name in group else None
 
 
-def _member(path: Path, group: h5py.Group, name: str) -> Any:
-    """Member of a group that is in this file."""
+def member(path: Path, group: h5py.Group, name: str) -> Any:
+    """Member of a group that is in this file.
+
+    Raises
+    ------
+    DataError
+        If there is none, or a link leads out of the file.
+    """
     if name not in group:
         where = f"{group.name.rstrip('/')}/{name}"
         raise DataError(f"{path}: no dataset {where}, expected it, found {printable(', '.join(group)) or 'nothing'}")
@@ -280,17 +300,28 @@ def _member(path: Path, group: h5py.Group, name: str) -> Any:
     return group[name]
 
 
-def _dataset(
+def dataset(
     path: Path, group: h5py.Group, name: str, dimensions: int, rows: int | None, kinds: str = "iuf"
 ) -> h5py.Dataset:
     """Dataset of numbers whose shape is believed only as far as its bytes in the file go.
+
+    Parameters
+    ----------
+    path, group, name : Path, Group, str
+        Where it is.
+    dimensions : int
+        1 or 2.
+    rows : int or None
+        Length of the first, None if any will do.
+    kinds : str
+        NumPy's letters of the types that will do.
 
     Raises
     ------
     DataError
         If it is missing, of another type or shape, outside this file, or claims more than the file can hold.
     """
-    found = _member(path, group, name)
+    found = member(path, group, name)
     where = f"{path}: {group.name.rstrip('/')}/{name}"
     if not isinstance(found, h5py.Dataset) or found.shape is None:
         raise DataError(f"{where} is a {type(found).__name__} without a shape, expected a dataset")
@@ -298,8 +329,8 @@ def _dataset(
         expected = "integers or floats" if "f" in kinds else "integers"
         raise DataError(f"{where} is of dtype {printable(str(found.dtype))}, expected {expected} of at most 8 bytes")
     if found.ndim != dimensions or rows not in (None, found.shape[0]):
-        expected = "(waveform, sample)" if dimensions == 2 else f"({'n' if rows is None else rows},)"
-        raise DataError(f"{where} has shape {found.shape}, expected {expected}")
+        shapes = ("(n,)", "(waveform, sample)") if rows is None else (f"({rows},)", f"({rows}, m)")
+        raise DataError(f"{where} has shape {found.shape}, expected {shapes[dimensions - 1]}")
     if found.is_virtual or found.external:
         raise DataError(f"{where} refers to other files, expected its data in the file itself")
     if found.chunks is not None:

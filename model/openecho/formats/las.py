@@ -10,6 +10,7 @@ from typing import IO, Any
 
 import laspy
 import numpy as np
+from laspy.vlrs.known import WktCoordinateSystemVlr
 from numpy.typing import NDArray
 
 from openecho.formats.packets import HEADER, SAMPLE_BITS, read_packets
@@ -90,6 +91,9 @@ def open_las(path: Path) -> Recording:
         spacings = sorted({descriptor.temporal_sample_spacing for descriptor in used})
         if len(spacings) > 1 or spacings[0] == 0:
             raise DataError(f"{path}: temporal spacings of {spacings} ps, expected one for all waveforms, above 0")
+        scales = las.header.scales
+        if not ((scales > 0) & np.isfinite(scales)).all():
+            raise DataError(f"{path}: coordinates have scales {scales.tolist()}, expected numbers above 0")
         volts = {(descriptor.digitizer_gain, descriptor.digitizer_offset) for descriptor in used}
 
         def read(first: int, count: int) -> Block:
@@ -123,7 +127,15 @@ def open_las(path: Path) -> Recording:
             parts=((None, len(lengths)),),
             reader=read,
             closer=stack.pop_all().close,
+            resolution=tuple(scales.tolist()),
+            wkt=_wkt(las),
         )
+
+
+def _wkt(las: laspy.LasReader) -> str | None:
+    """Coordinate system as the file's OGC WKT record has it."""
+    found = [vlr.string for vlr in las.header.vlrs if isinstance(vlr, WktCoordinateSystemVlr)]
+    return found[0] if found else None
 
 
 def _check_header(path: Path, header: bytes, size: int) -> None:

@@ -70,7 +70,7 @@ def open_npz(path: Path) -> Recording:
         If it holds anything else; other exceptions stand for an unreadable file.
     """
     with ExitStack() as stack, zipfile.ZipFile(path) as archive:
-        members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
+        members = keys(archive)
         missing = [key for key in ("samples", "length") if key not in members]
         if missing:
             raise DataError(
@@ -78,7 +78,7 @@ def open_npz(path: Path) -> Recording:
                 f"found {printable(', '.join(members)) or 'none'}"
             )
         arrays = {
-            key: _map(path, key, _unpacked(path, archive, members[key], stack))
+            key: unpacked(path, archive, members[key], stack)
             for key in ("samples", "length", "bin_ns")
             if key in members
         }
@@ -126,13 +126,37 @@ def _recording(
     )
 
 
-def _unpacked(path: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, stack: ExitStack) -> IO[bytes]:
-    """Member of an archive as a temporary file, its checksum compared by zipfile on the way."""
+def keys(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
+    """Members of an archive by the keys under which NumPy knows them."""
+    return {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
+
+
+def unpacked(path: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, stack: ExitStack) -> NDArray[Any]:
+    """Array of an archive, mapped from a temporary file; zipfile compares its checksum on the way.
+
+    Parameters
+    ----------
+    path, archive, info : Path, ZipFile, ZipInfo
+        Where it is.
+    stack : ExitStack
+        Closes the temporary file, which takes the decompressed size on disk.
+
+    Returns
+    -------
+    array
+        Of any shape and type but object.
+
+    Raises
+    ------
+    DataError
+        If it can't be as large as it claims, or is no array; other exceptions stand for an unreadable file.
+    """
+    key = printable(info.filename.removesuffix(".npy"))
     if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-        raise DataError(f"{path}: {info.filename} has zip method {info.compress_type}, expected stored or deflated")
+        raise DataError(f"{path}: {key}.npy has zip method {info.compress_type}, expected stored or deflated")
     if info.file_size > LARGEST_EXPANSION * info.compress_size or info.compress_size > path.stat().st_size:
         raise DataError(
-            f"{path}: {info.filename} claims {info.file_size} bytes in {info.compress_size}, "
+            f"{path}: {key}.npy claims {info.file_size} bytes in {info.compress_size}, "
             f"expected at most {LARGEST_EXPANSION} from one and no more than the file has"
         )
     file = stack.enter_context(tempfile.TemporaryFile())  # noqa: SIM115, the stack closes it
@@ -141,7 +165,7 @@ def _unpacked(path: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, stack
             file.write(chunk)
     file.flush()
     file.seek(0)
-    return file
+    return _map(path, key, file)
 
 
 def _map(path: Path, name: str, file: IO[bytes]) -> NDArray[Any]:
@@ -152,7 +176,7 @@ def _map(path: Path, name: str, file: IO[bytes]) -> NDArray[Any]:
         raise DataError(f"{path}: {name} in npy version {version[0]}.{version[1]}, expected 1.0 or 2.0")
     shape, fortran, dtype = read_header(file)
     if dtype.hasobject:
-        raise DataError(f"{path}: {name} are of dtype object, expected integers: allow_pickle is never set")
+        raise DataError(f"{path}: {name} are of dtype object, expected numbers: allow_pickle is never set")
     start, end = file.tell(), file.seek(0, 2)
     needed = dtype.itemsize
     for side in shape:

@@ -160,6 +160,7 @@ def open_pulsewaves(path: Path) -> Recording:
             parts=((None, len(index)),),
             reader=read,
             closer=stack.pop_all().close,
+            resolution=tuple(scale.tolist()),
         )
 
 

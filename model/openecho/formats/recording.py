@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 MAX_LENGTH = 65536
 """Samples in a waveform that are believed: sixteen times the core's default, beyond any digitiser's record."""
 
+BLOCK = 2**20
+"""Samples in a block if nobody asks for another size: two megabytes, and a hundred while the golden model works."""
+
 LARGEST_COUNT = 2**16 - 1
 """Samples are handed out as uint16; no supported digitiser has more bits."""
 
@@ -99,6 +102,10 @@ class Recording:
         (first, count) to Block, within one part; `read` checks and guards it.
     closer : callable
         Releases the file.
+    resolution : (float, float, float) or None
+        Steps in which the coordinates are known, None where the file has none.
+    wkt : str or None
+        Coordinate system as OGC WKT, None where the file doesn't tell it in this form.
     """
 
     path: Path
@@ -112,6 +119,8 @@ class Recording:
     parts: tuple[tuple[str | None, int], ...]
     reader: Callable[[int, int], Block]
     closer: Callable[[], None]
+    resolution: tuple[float, float, float] | None = None
+    wkt: str | None = None
 
     def __enter__(self) -> Self:
         return self
@@ -154,12 +163,20 @@ class Recording:
         with one_line(self.path, f"readable {self.format}"), np.errstate(over="ignore", invalid="ignore"):
             return self.reader(first, min(count, end - first))
 
-    def blocks(self, size: int, first: int = 0) -> Iterator[Block]:
-        """Yield all waveforms from `first` on in blocks of at most `size`, each read when it is asked for."""
-        while first < self.waveforms:
-            block = self.read(first, size)
-            yield block
-            first += len(block.length)
+    def plan(self, size: int | None = None) -> list[tuple[int, int]]:
+        """First waveform of each block and their number: at most `size`, or about `BLOCK` samples, and of one beam."""
+        size = max(1, BLOCK // self.longest) if size is None else size
+        plan, start = [], 0
+        for _, count in self.parts:
+            end = start + count
+            plan += [(first, min(size, end - first)) for first in range(start, end, size)]
+            start = end
+        return plan
+
+    def blocks(self, size: int | None = None) -> Iterator[Block]:
+        """Yield all waveforms in the blocks of `plan`, each read when it is asked for."""
+        for first, count in self.plan(size):
+            yield self.read(first, count)
 
 
 @contextmanager

@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 from openecho.formats.detect import open
 from openecho.formats.recording import check_range, one_line
 
-BLOCK = 4096
-"""Waveforms that are read at a time."""
-
 
 @dataclass(frozen=True)
 class Waveforms:
@@ -58,7 +55,7 @@ def load(path: str | Path, sample_w: int) -> Waveforms:
         with one_line(recording.path, "a file that fits in memory"):
             samples = np.zeros((recording.waveforms, recording.longest), np.uint16)
             length = np.zeros(recording.waveforms, np.int32)
-        for block in recording.blocks(BLOCK):
+        for block in recording.blocks():
             check_range(recording.path, "samples", block.samples, 0, 2**sample_w - 1, block.first)
             rows = slice(block.first, block.first + len(block.length))
             samples[rows, : block.samples.shape[1]] = block.samples
