@@ -20,7 +20,7 @@ TAPS_FLAG  := $(if $(TAPS),--taps='$(TAPS)')
 SIM_FLAGS  := $(if $(MODULE),--module '$(MODULE)') $(ARITH_FLAG) $(TAPS_FLAG) $(if $(SIM),--sim '$(SIM)') \
               $(if $(DATA),--data '$(DATA)') $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(WAVES)),--waves)
 
-.PHONY: help sim replay test vectors lint format mutate synth precision readme clean
+.PHONY: help sim replay test vectors lint format mutate synth precision score scale readme clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -51,6 +51,13 @@ synth: $(VENV)/.synth ## area on xc7, with CLOCK=1 also the clock on ECP5, of al
 
 precision: $(READY) ## Monte Carlo of the echo position against the Cramér–Rao bound [SEED=]
 	@$(RUN) -m openecho.study.precision $(if $(SEED),--seed '$(SEED)')
+
+score: $(READY) ## judge the echoes of every tap set by the references that a file carries, DATA=file [ARITH=]
+	@mkdir -p build/reports
+	@$(VENV)/bin/openecho score $(if $(DATA),'$(DATA)') $(ARITH_FLAG) --output build/reports/score.json
+
+scale: $(READY) ## speed and memory on a large granule, interrupted, resumed and in two processes [SEED=]
+	@$(RUN) -m openecho.study.scale $(if $(SEED),--seed '$(SEED)')
 
 readme: $(READY) ## copy the figures of build/reports/ into README.md
 	@$(RUN) scripts/readme.py

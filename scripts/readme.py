@@ -9,12 +9,15 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from openecho import report
-from openecho.golden import ARITHMETICS
+from openecho.decompose import COLUMNS
+from openecho.golden import ARITHMETICS, TAP_SETS
 from openecho.hardware import ROOT, bench_names
 from openecho.study import comparison
 
 README = ROOT / "README.md"
 PICTURE = ROOT / "docs" / "core.png"
+MAKERS = ("make sim", "make precision", "make synth CLOCK=1", "make score DATA=gedi_cerrado.npz")
+"""What makes the reports."""
 
 
 def main() -> int:
@@ -22,12 +25,12 @@ def main() -> int:
     text = README.read_text()
     try:
         for name, (source, lines) in PARTS.items():
-            content = json.loads((report.FOLDER / f"{source}.json").read_text())
+            content = {} if source is None else json.loads((report.FOLDER / f"{source}.json").read_text())
             text = replaced(text, name, lines(content))
         PICTURE.parent.mkdir(exist_ok=True)
         shutil.copyfile(report.FOLDER / PICTURE.name, PICTURE)
     except FileNotFoundError as error:
-        print(f"error: no {error.filename}: run make sim, make precision and make synth CLOCK=1 first", file=sys.stderr)
+        print(f"error: no {error.filename}: run {', '.join(MAKERS)} first", file=sys.stderr)
         return 2
     except ValueError as error:
         print(f"error: {error}", file=sys.stderr)
@@ -173,11 +176,34 @@ def echoes(content: dict[str, Any]) -> list[str]:
     return table(head, rows)
 
 
-PARTS: dict[str, tuple[str, Callable[[dict[str, Any]], list[str]]]] = {
+def columns(_: dict[str, Any]) -> list[str]:
+    """Columns of a table of echoes."""
+    needs = {"": "always", "bin_ns": "sample interval", "geolocation": "positions", "time": "times of shots"}
+    needs |= {"shot": "numbers of shots", "beam": "several beams"}
+    rows = [f"| `{column.name}` | {column.unit} | {column.meaning} | {needs[column.needs]} |" for column in COLUMNS]
+    return ["| column | unit | | where the file has |", "| --- | --- | --- | --- |", *rows]
+
+
+def recall(content: dict[str, Any]) -> list[str]:
+    """What each tap set finds of the modes of GEDI's six settings, and how many echoes they know nothing of."""
+    names = [row["name"] for row in content["taps"]["paper"]["references"] if row["name"] != "g1"]
+    if names != [f"a{setting}" for setting in range(1, 7)] or list(content["taps"]) != list(TAP_SETS):
+        raise ValueError(f"score.json has references {', '.join(names)}: run {MAKERS[-1]}")
+    rows = []
+    for taps, result in content["taps"].items():
+        found = {row["name"]: row for row in result["references"]}
+        cells = [f"{found[name]['within_1']:.1%}, {found[name]['spurious_per_waveform']:.2f}" for name in names]
+        rows.append((f"`{taps}`", *cells))
+    return table(("taps", *names), rows)
+
+
+PARTS: dict[str, tuple[str | None, Callable[[dict[str, Any]], list[str]]]] = {
     "modules": ("sim", modules),
     "units": ("sim", units),
     "area": ("synth", area),
     "precision": ("precision", precision),
+    "columns": (None, columns),
+    "recall": ("score", recall),
     "differences": ("core_vs_float64", differences),
     "echoes": ("core_vs_float64", echoes),
 }

@@ -27,6 +27,7 @@ from rich.table import Table
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from openecho import formats, golden, report, stimulus
+from openecho.decompose import tabulate
 from openecho.golden import ARITHMETICS, TAP_SETS
 from openecho.hardware import ROOT, bench_names
 from openecho.study import comparison, figure
@@ -223,12 +224,12 @@ def report_cores(job: Job, directory: Path, console: Console) -> None:
         if module != "core":
             continue
         config = job.config(arithmetic)
-        records = golden.decode_records(np.load(directory / f"core-{arithmetic}" / "result.npy"), config)
-        compared[arithmetic] = comparison.compare(records, samples, length, config)
+        records = np.load(directory / f"core-{arithmetic}" / "result.npy")
+        compared[arithmetic] = comparison.compare(golden.decode_records(records, config), samples, length, config)
         if arithmetic == "fixed":
             picture = report.FOLDER / "core.png"
             rows = {"land": 0, "ocean": stimulus.WAVEFORMS}
-            figure.draw(picture, records, samples, length, config, rows)
+            figure.save(figure.draw(tabulate(records, config, None), samples, length, config, rows), picture)
             console.print(picture, soft_wrap=True)
     if compared:
         content = {

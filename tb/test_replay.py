@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from openecho import formats, golden, stimulus
+from openecho.decompose import EngineError, decompose
 from openecho.golden import ARITHMETICS, Config
 from openecho.hardware import ROOT
 from tb.env import runner
@@ -57,6 +58,19 @@ def test_reference_waveforms_give_the_records_of_the_golden_model_without_a_stal
     assert replayed.records.dtype == expected.dtype
     assert replayed.stalls == 0
     assert made.length.sum() < replayed.cycles < made.length.sum() + 2000
+
+
+def test_engine_rtl_gives_the_echoes_of_the_model(made: stimulus.Stimulus) -> None:
+    modelled, simulated = (decompose(made.samples, made.length, engine=engine, k=5) for engine in ("model", "rtl"))
+    assert len(simulated.echoes)
+    np.testing.assert_array_equal(simulated.echoes, modelled.echoes)
+    np.testing.assert_array_equal(simulated.waveforms, modelled.waveforms)
+
+
+def test_engine_rtl_without_a_compiler_says_so(made: stimulus.Stimulus, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(EngineError, match=r"^engine rtl: verilator: g\+\+ not found, expected it on PATH"):
+        decompose(made.samples, made.length, engine="rtl")
 
 
 @pytest.mark.parametrize("simulator", runner.find_simulators())

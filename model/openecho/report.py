@@ -45,7 +45,12 @@ def write(name: str, content: dict[str, Any]) -> Path:
     """
     FOLDER.mkdir(parents=True, exist_ok=True)
     path = FOLDER / f"{name}.json"
-    partial = path.with_suffix(".partial")
+    save(path, content)
+    return path
+
+
+def save(path: Path, content: dict[str, Any]) -> None:
+    """Write JSON types and numpy scalars to a file, complete or not at all."""
+    partial = path.with_name(f"{path.name}.partial")
     partial.write_text(json.dumps(content, indent=1, default=lambda value: value.item()) + "\n")
     partial.replace(path)
-    return path

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from openecho import golden, report, stimulus
+from openecho.decompose import criteria, decompose
 from openecho.study import comparison, figure, precision
 
 
@@ -88,14 +89,44 @@ def test_comparison_counts_waveforms_with_other_echoes() -> None:
     assert comparison.compare(without_first, made.samples, made.length, config)["differing_waveforms"] == 1
 
 
-def test_figure_is_drawn_with_and_without_echoes(tmp_path: Path) -> None:
+def test_figure_shows_the_echoes_their_sum_and_what_they_leave(tmp_path: Path) -> None:
     made, config = stimulus.reference_set(0), golden.Config()
-    samples, length = made.samples.copy(), made.length
-    samples[1] = 20
-    records = golden_records(stimulus.Stimulus(samples, length, made.truth), config)
-    figure.draw(tmp_path / "core.png", records, samples, length, config, {"land": 0, "nothing": 1})
+    found = decompose(made.samples, made.length)
+    for row in (0, 20):
+        raw = made.samples[row, : made.length[row]].astype(float)
+        mine, mean = found.echoes[found.echoes["waveform"] == row], found.waveforms["noise_mean"]
+        total = criteria.fitted(found.echoes, mean, 1024)[row, : made.length[row]]
+        drawn = figure.draw(found, made.samples, made.length, config, {"one": row}, 2.0)
+        shown = {line.get_label(): np.asarray(line.get_ydata()) for axes in drawn.axes for line in axes.lines}
+        np.testing.assert_array_equal(shown["raw waveform"], raw)
+        np.testing.assert_array_equal(shown["their sum"], total)
+        np.testing.assert_array_equal(shown["residual"], raw - total)
+        np.testing.assert_array_equal(shown["peak, amplitude"], mean[row] + mine["amplitude"])
+    (tmp_path / "core.png").write_bytes(b"before")
+    figure.save(drawn, tmp_path / "core.png")
     assert (tmp_path / "core.png").read_bytes().startswith(b"\x89PNG")
     assert [path.name for path in tmp_path.iterdir()] == ["core.png"]
+
+
+@pytest.mark.parametrize("length", [1, 19, 21, 22, 400])
+def test_figure_of_a_waveform_without_echoes_shows_all_of_it(tmp_path: Path, length: int) -> None:
+    samples, lengths = np.full((1, length), 20), np.array([length])
+    found = decompose(samples, lengths)
+    drawn = figure.draw(found, samples, lengths, golden.Config(), {"nothing": 0})
+    assert drawn.axes[0].get_xlim() == (-0.5, length - 0.5)
+    figure.save(drawn, tmp_path / "nothing.svg")
+    assert [path.name for path in tmp_path.iterdir()] == ["nothing.svg"]
+
+
+def test_a_picture_that_cannot_be_made_is_refused_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = decompose(np.full((1, 60), 20))
+    drawn = figure.draw(found, np.full((1, 60), 20), np.array([60]), golden.Config(), {"nothing": 0})
+    with pytest.raises(figure.FigureError, match=r"a\.txt: found suffix '\.txt', expected one of eps, [^\n]*$"):
+        figure.save(drawn, tmp_path / "a.txt")
+    monkeypatch.setattr("matplotlib.pyplot.get_backend", lambda: "agg")
+    with pytest.raises(figure.FigureError, match=r"^found no display for a window, expected one, or -o FILE\.png$"):
+        figure.show(drawn)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_report_is_whole_or_absent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

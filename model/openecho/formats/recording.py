@@ -242,6 +242,12 @@ def check_range(path: Path, name: str, values: NDArray[Any], low: int, high: int
         raise DataError(f"{path}: {name} of {where} is {values[at]}, expected {low} to {high}")
 
 
+def check_bits(path: Path, block: Block, sample_w: int) -> None:
+    """Raise a DataError for the first sample of a block that has more than `sample_w` bits."""
+    if block.samples.max() >> sample_w:
+        check_range(path, "samples", block.samples, 0, 2**sample_w - 1, block.first)
+
+
 def check_waveforms(path: Path, count: int, longest: int) -> None:
     """Raise a DataError for a recording without waveforms, or with longer ones than are believed."""
     if count < 1 or longest < 1:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from openecho.formats.detect import open
-from openecho.formats.recording import check_range, one_line
+from openecho.formats.recording import check_bits, one_line
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def load(path: str | Path, sample_w: int) -> Waveforms:
             samples = np.zeros((recording.waveforms, recording.longest), np.uint16)
             length = np.zeros(recording.waveforms, np.int32)
         for block in recording.blocks():
-            check_range(recording.path, "samples", block.samples, 0, 2**sample_w - 1, block.first)
+            check_bits(recording.path, block, sample_w)
             rows = slice(block.first, block.first + len(block.length))
             samples[rows, : block.samples.shape[1]] = block.samples
             length[rows] = block.length

@@ -1,4 +1,4 @@
-"""The picture of a decomposition: waveform, filtered waveform, second difference, inflections and echoes."""
+"""The picture of a decomposition: waveform, echoes and their sum, what they leave, and where the core found them."""
 
 from __future__ import annotations
 
@@ -8,33 +8,42 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.registry import BackendFilter, backend_registry
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from openecho import golden, stimulus
+from openecho import golden
+from openecho.decompose import Decomposition
+from openecho.decompose.criteria import component_width, fitted
 
-RAW, FILTERED, CURVATURE, FOUND = "#909090", "#1f4e79", "#5f6b3a", "#c0392b"
+RAW, FILTERED, CURVATURE, FOUND, SUM = "#909090", "#1f4e79", "#5f6b3a", "#c0392b", "#e08214"
 
 MARGIN = 40
 """Bins shown on either side of the echoes."""
 
 
+class FigureError(RuntimeError):
+    """A picture that can't be written or shown as asked: one line with what was found and what was expected."""
+
+
 def draw(
-    path: Path,
-    records: np.ndarray,
+    found: Decomposition,
     samples: NDArray[Any],
     length: NDArray[Any],
     config: golden.Config,
     rows: Mapping[str, int],
-) -> None:
+    bin_ns: float | None = None,
+) -> Figure:
     """Draw waveforms with the echoes that the core found in them.
+
+    From top to bottom: raw and filtered waveform, each echo as a Gaussian of its corrected width where its peak is, and
+    the sum of them; the raw waveform less that sum, with the noise deviation to either side; and the second difference
+    with the inflections.
 
     Parameters
     ----------
-    path : Path
-        Picture to write; its suffix decides the format.
-    records : structured (records,)
-        The core's output for these waveforms, decoded; its sequence starts at 0.
+    found : Decomposition
+        Of these waveforms.
     samples : integer (n, m)
         Raw waveforms, counts.
     length : integer (n,)
@@ -43,55 +52,116 @@ def draw(
         What the core was built with and set to.
     rows : mapping
         Title to row of `samples`; one column of the picture each.
+    bin_ns : float, optional
+        Sample interval in nanoseconds, for a scale of them.
+
+    Returns
+    -------
+    Figure
     """
-    figure = Figure(figsize=(6.5 * len(rows), 6.5), layout="constrained")
-    axes = figure.subplots(2, len(rows), sharex="col", squeeze=False, height_ratios=[2, 1])
+    figure = Figure(figsize=(6.5 * len(rows), 8), layout="constrained")
+    axes = figure.subplots(3, len(rows), sharex="col", squeeze=False, height_ratios=[3, 1, 1.5])
     for column, (title, row) in enumerate(rows.items()):
-        upper, lower = axes[:, column]
-        mine = records[records["sequence"] == row]
-        _waveform(upper, samples[row, : length[row]], mine, config)
-        _second_difference(lower, samples[row, : length[row]], mine[~mine["trailer"]], config)
-        upper.set_title(title)
-        lower.set_xlabel("bin")
-    axes[0, 0].set_ylabel("counts")
-    axes[1, 0].set_ylabel("counts/bin²")
-    axes[0, -1].legend(loc="upper right", frameon=False, fontsize=9)
-    axes[1, -1].legend(loc="lower right", frameon=False, fontsize=9)
-    path.parent.mkdir(parents=True, exist_ok=True)
+        waveform, residual, second = axes[:, column]
+        raw = samples[row, : length[row]].astype(float)
+        echoes = found.echoes[found.echoes["waveform"] == row]
+        _waveform(waveform, raw, echoes, found.waveforms[row], config)
+        _residual(residual, raw, echoes, found.waveforms[row])
+        _second_difference(second, raw, echoes, config)
+        waveform.set_xlim(*_window(echoes, len(raw)))
+        waveform.set_title(title)
+        second.set_xlabel("bin")
+        if bin_ns is not None:
+            to_ns, to_bins = (lambda x: x * bin_ns), (lambda ns: ns / bin_ns)
+            waveform.secondary_xaxis("top", functions=(to_ns, to_bins)).set_xlabel("ns")
+    for axis, label in zip(axes[:, 0], ("counts", "raw - sum, counts", "counts/bin²"), strict=True):
+        axis.set_ylabel(label)
+    axes[0, -1].legend(loc="upper right", frameon=False, fontsize=8)
+    for axis in axes[1:, -1]:
+        axis.legend(loc="best", frameon=False, fontsize=8, ncols=2)
+    figure.align_ylabels(axes[:, 0])
+    return figure
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a picture, complete or not at all; the suffix decides the format.
+
+    Raises
+    ------
+    FigureError
+        For a suffix that matplotlib does not know.
+    OSError
+        If it can't be written.
+    """
+    known = figure.canvas.get_supported_filetypes()
+    if path.suffix[1:].casefold() not in known:
+        raise FigureError(f"{path}: found suffix {path.suffix!r}, expected one of {', '.join(known)}")
     partial = path.with_name(f"partial_{path.name}")
-    figure.savefig(partial, dpi=120)
-    partial.replace(path)
+    try:
+        figure.savefig(partial, dpi=120)
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
 
 
-def _waveform(axes: Axes, samples: NDArray[Any], records: np.ndarray, config: golden.Config) -> None:
-    """Raw and filtered waveform, and each echo as the Gaussian that its record describes."""
-    echoes = records[~records["trailer"]]
-    baseline = float(records["noise_mean"][records["trailer"]][0])
-    x = np.arange(len(samples))
+def show(figure: Figure) -> None:
+    """Open a window and wait until it is closed.
+
+    Raises
+    ------
+    FigureError
+        If there is nowhere to open one.
+    """
+    import matplotlib.pyplot as plt  # looks for a display when it is imported, which nobody else needs
+
+    windows = backend_registry.list_builtin(BackendFilter.INTERACTIVE)  # type: ignore[no-untyped-call]
+    if plt.get_backend().casefold() not in windows:
+        raise FigureError("found no display for a window, expected one, or -o FILE.png")
+    plt.figure(figure)  # type: ignore[arg-type, unused-ignore]
+    plt.show()
+
+
+def _waveform(
+    axes: Axes, raw: NDArray[np.float64], echoes: np.ndarray, noise: np.ndarray, config: golden.Config
+) -> None:
+    """Raw and filtered waveform, each echo, and the sum of all."""
+    baseline, x = float(noise["noise_mean"]), np.arange(len(raw))
     taps = np.array(config.taps) / sum(config.taps)
-    # Only where the filter lies inside the waveform, and moved back by its group delay.
-    filtered = np.convolve(samples, taps, "valid")
-    axes.plot(x, samples, ".", color=RAW, markersize=4, label="raw waveform")
-    axes.plot(np.arange(len(filtered)) + (len(taps) - 1) / 2, filtered, color=FILTERED, lw=1.2, label="filtered")
-    for echo in echoes:
-        shape = baseline + stimulus.gaussians(len(samples), np.atleast_1d(echo))
-        near = np.abs(x - echo["centre"]) < 3.5 * echo["width"]
-        axes.fill_between(x[near], baseline, shape[near], color=FOUND, alpha=0.12, lw=0)
-        axes.plot(x[near], shape[near], color=FOUND, lw=0.9, alpha=0.8)
+    axes.plot(x, raw, ".", color=RAW, markersize=4, label="raw waveform")
+    if len(raw) >= len(taps):
+        # Only where the filter lies inside the waveform, and moved back by its group delay.
+        filtered = np.convolve(raw, taps, "valid")
+        axes.plot(np.arange(len(filtered)) + (len(taps) - 1) / 2, filtered, color=FILTERED, lw=1.2, label="filtered")
+    for echo, width in zip(echoes, component_width(echoes), strict=True):
+        near = np.abs(x - echo["peak"]) < 3.5 * width
+        shape = baseline + echo["amplitude"] * np.exp(-0.5 * ((x[near] - echo["peak"]) / width) ** 2)
+        axes.fill_between(x[near], baseline, shape, color=FOUND, alpha=0.15, lw=0)
+        axes.plot(x[near], shape, color=FOUND, lw=0.8, alpha=0.8)
+    axes.plot([], [], color=FOUND, lw=0.9, label="echoes")
+    axes.plot(x, _sum(echoes, baseline, len(raw)), "--", color=SUM, lw=1.2, label="their sum")
     height = baseline + echoes["amplitude"]
     axes.vlines(echoes["centre"], baseline, height, color=FOUND, lw=0.9, ls=":", label="centre")
     axes.plot(echoes["peak"], height, "v", color=FOUND, markersize=6, label="peak, amplitude")
-    axes.plot([], [], color=FOUND, lw=0.9, label="echo as recorded")
-    axes.set_xlim(*_window(echoes, len(samples)))
     axes.margins(y=0.1)
 
 
-def _second_difference(axes: Axes, samples: NDArray[Any], echoes: np.ndarray, config: golden.Config) -> None:
+def _residual(axes: Axes, raw: NDArray[np.float64], echoes: np.ndarray, noise: np.ndarray) -> None:
+    """Raw waveform less the sum of its echoes."""
+    left = raw - _sum(echoes, float(noise["noise_mean"]), len(raw))
+    deviation = float(noise["noise_deviation"])
+    axes.axhspan(-deviation, deviation, color=FILTERED, alpha=0.15, lw=0, label="noise deviation")
+    axes.axhline(0, color="black", lw=0.6)
+    axes.plot(np.arange(len(raw)), left, color=RAW, lw=1, label="residual")
+
+
+def _second_difference(axes: Axes, raw: NDArray[np.float64], echoes: np.ndarray, config: golden.Config) -> None:
     """Second difference with its group delay taken out, and the inflections of each echo."""
     taps = np.array(config.taps) / sum(config.taps)
-    second = np.convolve(np.diff(samples.astype(float), 2), taps, "valid")
     axes.axhline(0, color="black", lw=0.6)
-    axes.plot(np.arange(len(second)) + (len(taps) + 1) / 2, second, color=CURVATURE, lw=1.2, label="second difference")
+    if len(raw) >= len(taps) + 2:
+        second = np.convolve(np.diff(raw, 2), taps, "valid")
+        x = np.arange(len(second)) + (len(taps) + 1) / 2
+        axes.plot(x, second, color=CURVATURE, lw=1.2, label="second difference")
     half = echoes["width"] * max(config.n, 1) / 2
     for centre, reach in zip(echoes["centre"], half, strict=True):
         axes.axvspan(centre - reach, centre + reach, color=FOUND, alpha=0.08, lw=0)
@@ -101,10 +171,18 @@ def _second_difference(axes: Axes, samples: NDArray[Any], echoes: np.ndarray, co
     )
 
 
+def _sum(echoes: np.ndarray, baseline: float, length: int) -> NDArray[np.float64]:
+    """Sum of the echoes of one waveform on its baseline (length,), counts."""
+    alone = echoes.copy()
+    alone["waveform"] = 0
+    total: NDArray[np.float64] = fitted(alone, np.array([baseline]), length)[0]
+    return total
+
+
 def _window(echoes: np.ndarray, length: int) -> tuple[float, float]:
-    """Bins that hold all echoes; the whole waveform if there is none."""
-    if len(echoes) == 0:
-        return 0, length
+    """First and last bin to show: the echoes and a margin, or the whole waveform if there are none."""
+    if not len(echoes):
+        return -0.5, length - 0.5
     reach = 3 * echoes["width"]
-    low, high = np.min(echoes["centre"] - reach), np.max(echoes["centre"] + reach)
-    return max(0.0, float(low) - MARGIN), min(float(length), float(high) + MARGIN)
+    low, high = (echoes["centre"] - reach).min() - MARGIN, (echoes["centre"] + reach).max() + MARGIN
+    return max(low, 0), min(high, length - 1)
