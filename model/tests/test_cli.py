@@ -177,14 +177,15 @@ def test_a_full_disk_is_told_in_one_line_and_leaves_no_result(tmp_path: Path) ->
     granule(tmp_path / "granule.h5", 3000, 0)
 
     def no_room() -> None:
-        # What is written past 300 kB of a file fails, as past the end of a disk.
-        resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
+        # What is written past 400 kB of a file fails, as past the end of a disk: blocks are less, tables are more.
+        resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000))
 
     for name in ("echoes.csv", "echoes.parquet", "echoes.npz", "echoes.las"):
         command: list[str | Path] = [PROGRAM, "decompose", tmp_path / "granule.h5", "-o", tmp_path / name]
         done = subprocess.run(command, capture_output=True, text=True, check=False, preexec_fn=no_room)
-        refused((done.returncode, done.stdout, done.stderr), "File too large")
+        refused((done.returncode, done.stdout, done.stderr), f"{tmp_path / name}.partial/table", "File too large")
         assert not (tmp_path / name).exists()
+        assert not list(tmp_path.glob(f"{name}.partial/table*"))
 
 
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])

@@ -16,7 +16,7 @@ import numpy as np
 
 from openecho import __version__, formats, tables
 from openecho.batch.distribute import run
-from openecho.batch.store import Store, open_store
+from openecho.batch.store import Store, open_store, written
 from openecho.decompose import ENGINES, Decomposition, configure, dtype, tabulate, troubles
 from openecho.formats import Block, Recording
 from openecho.formats.recording import check_bits
@@ -285,6 +285,7 @@ def _write(
         date=dt.datetime.fromtimestamp(recording.path.stat().st_mtime, dt.UTC).date(),
     )
     made = store.folder / f"table{store.result.suffix}"
-    written = tables.write(made, table)
+    with written(made):
+        count = tables.write(made, table)
     store.finish(made)
-    return Result(len(waveforms), echoes, written, resumed, troubles(waveforms))
+    return Result(len(waveforms), echoes, count, resumed, troubles(waveforms))

@@ -42,9 +42,10 @@ class Store:
         """Keep the arrays of a block, complete or not at all."""
         path = self._path(number)
         partial = path.with_suffix(".new")
-        with partial.open("wb") as file:
-            np.savez(file, **arrays)  # type: ignore[arg-type, unused-ignore]
-        partial.replace(path)
+        with written(partial):
+            with partial.open("wb") as file:
+                np.savez(file, **arrays)  # type: ignore[arg-type, unused-ignore]
+            partial.replace(path)
 
     def get(self, number: int, name: str) -> np.ndarray:
         """One array of a finished block.
@@ -69,6 +70,17 @@ class Store:
 
     def _path(self, number: int) -> Path:
         return self.folder / f"{number:06}.npz"
+
+
+@contextmanager
+def written(path: Path) -> Iterator[None]:
+    """Name the file in an error of writing it, which a full disk alone does not, and leave nothing of it."""
+    try:
+        yield
+    except OSError as error:
+        path.unlink(missing_ok=True)
+        error.filename = error.filename or str(path)
+        raise
 
 
 @contextmanager
