@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from openecho import golden, report, stimulus
 from openecho.decompose import criteria, decompose
@@ -108,6 +110,24 @@ def test_figure_shows_the_echoes_their_sum_and_what_they_leave(tmp_path: Path) -
     assert [path.name for path in tmp_path.iterdir()] == ["core.png"]
 
 
+@pytest.mark.parametrize("echoes", [0, 1, 20])
+def test_the_legend_covers_no_panel(echoes: int) -> None:
+    truth = np.zeros(echoes, stimulus.TRUTH)
+    truth["centre"], truth["width"], truth["amplitude"] = 80 + 55 * np.arange(echoes), 7, 150
+    samples = stimulus.quantise(20 + stimulus.gaussians(1200, truth))[np.newaxis]
+    found = decompose(samples)
+    assert len(found.echoes) == echoes
+    drawn = figure.draw(found, samples, np.array([1200]), golden.Config(), {"one": 0}, 1.0)
+    FigureCanvasAgg(drawn).draw()  # type: ignore[no-untyped-call]
+    legend = drawn.legends[0].get_window_extent()
+    assert 0 <= legend.x0 < legend.x1 <= drawn.bbox.width
+    panels = [box.y0 for axes in drawn.axes if (box := axes.get_tightbbox()) is not None]
+    assert len(panels) == 3
+    assert 0 <= legend.y0 < legend.y1 < min(panels)
+    labels = [text.get_text() for text in drawn.legends[0].get_texts()]
+    assert sorted(labels) == sorted(set(labels))
+
+
 @pytest.mark.parametrize("length", [1, 19, 21, 22, 400])
 def test_figure_of_a_waveform_without_echoes_shows_all_of_it(tmp_path: Path, length: int) -> None:
     samples, lengths = np.full((1, length), 20), np.array([length])
@@ -123,6 +143,10 @@ def test_a_picture_that_cannot_be_made_is_refused_in_one_line(tmp_path: Path, mo
     drawn = figure.draw(found, np.full((1, 60), 20), np.array([60]), golden.Config(), {"nothing": 0})
     with pytest.raises(figure.FigureError, match=r"a\.txt: found suffix '\.txt', expected one of eps, [^\n]*$"):
         figure.save(drawn, tmp_path / "a.txt")
+    monkeypatch.setattr("matplotlib.pyplot.get_backend", lambda: "qtagg")
+    monkeypatch.setattr("matplotlib.pyplot.figure", lambda drawn: importlib.import_module("no_such_toolkit"))
+    with pytest.raises(figure.FigureError, match=r"^qtagg: found no toolkit for its windows, [^\n]* -o FILE\.png$"):
+        figure.show(drawn)
     monkeypatch.setattr("matplotlib.pyplot.get_backend", lambda: "agg")
     with pytest.raises(figure.FigureError, match=r"^found no display for a window, expected one, or -o FILE\.png$"):
         figure.show(drawn)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -32,6 +33,8 @@ def test_lengths_and_counts_are_those_of_recorded_samples(tmp_path: Path) -> Non
     assert told["samples"] == "9"
     assert told["counts"] == "5 to 300, 9 bits"
     assert told["sample interval"] == "not in the file"
+    assert "length" not in told
+    assert "shot numbers" not in told
     assert told["no noise"] == "3 waveforms of fewer than 50 samples"
 
 
@@ -70,6 +73,7 @@ def test_noise_that_never_varies_has_no_correlation(tmp_path: Path) -> None:
     assert told["noise lag 1"] == "constant"
     assert told["noise mean"] == "7.00 7.00 7.00 counts"
     assert told["sample interval"] == "2 ns"
+    assert told["length"] == "120.0 120.0 120.0 ns"
 
 
 def test_extent_is_that_of_both_ends_where_they_are_numbers(tmp_path: Path) -> None:
@@ -86,14 +90,21 @@ def test_extent_is_that_of_both_ends_where_they_are_numbers(tmp_path: Path) -> N
     assert told["x"] == f"{found.extent[0, 0]:.9g} to {found.extent[1, 0]:.9g}"
 
 
-def test_beams_and_progress_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_beams_shots_and_progress_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    numbers = [np.array([2**64 - 1, 8], "u8"), np.array([3, 5, 2**53 + 1], "u8")]
     gedi(tmp_path / "a", {"BEAM0000": [60, 50], "BEAM0110": [40] * 3})
+    with h5py.File(tmp_path / "a", "r+") as file:
+        for beam, number in zip(("BEAM0000", "BEAM0110"), numbers, strict=True):
+            file[beam]["shot_number"][...] = number
     monkeypatch.setattr(formats.recording, "BLOCK", 120)
     done: list[int] = []
     with formats.open(tmp_path / "a") as recording:
-        told = lines(recording, formats.survey(recording, done.append))
+        found = formats.survey(recording, done.append)
+        told = lines(recording, found)
     assert done == [2, 4, 5]
     assert told[3:5] == [("BEAM0000", "2 waveforms"), ("BEAM0110", "3 waveforms")]
+    assert found.shot == (2**64 - 1, 2**53 + 1)
+    assert told[-1] == ("shot numbers", f"{2**64 - 1} to {2**53 + 1}")
 
 
 def test_recorded_waveforms_are_what_their_description_says(recorded: Path) -> None:

@@ -34,6 +34,8 @@ class Survey:
         Least and greatest coordinates of first and last bins, of those that are numbers; nan where none is.
     time : (float, float) or None
         Least and greatest time of a shot.
+    shot : (int, int) or None
+        The instrument's own numbers of the first and of the last shot in the file.
     """
 
     length: NDArray[np.int32]
@@ -45,6 +47,7 @@ class Survey:
     noise_correlation: NDArray[np.float64]
     extent: NDArray[np.float64] | None
     time: tuple[float, float] | None
+    shot: tuple[int, int] | None
 
 
 def survey(recording: Recording, advance: Callable[[int], object] = lambda done: None) -> Survey:
@@ -66,7 +69,7 @@ def survey(recording: Recording, advance: Callable[[int], object] = lambda done:
     DataError
         If the recording can't be read.
     """
-    lengths, noises, extents, times = [], [], [], []
+    lengths, noises, extents, times, shots = [], [], [], [], []
     least, greatest, clipped = 2**16, -1, 0
     for block in recording.blocks():
         recorded = np.arange(block.samples.shape[1]) < block.length[:, None]
@@ -81,6 +84,8 @@ def survey(recording: Recording, advance: Callable[[int], object] = lambda done:
             extents.append(_extent(np.concatenate([block.geolocation.first, block.geolocation.last])))
         if block.time is not None:
             times.append(_extent(block.time[:, None]))
+        if block.shot is not None:
+            shots += [int(block.shot[0]), int(block.shot[-1])]
         advance(block.first + len(block.length))
     mean, deviation, correlation = np.concatenate(noises, axis=1)
     return Survey(
@@ -93,6 +98,7 @@ def survey(recording: Recording, advance: Callable[[int], object] = lambda done:
         noise_correlation=correlation,
         extent=_extent(np.concatenate(extents)) if extents else None,
         time=tuple(_extent(np.concatenate(times))[:, 0].tolist()) if times else None,
+        shot=(shots[0], shots[-1]) if shots else None,
     )
 
 
@@ -111,17 +117,20 @@ def noise(block: Block) -> NDArray[np.float64]:
 def lines(recording: Recording, found: Survey) -> list[tuple[str, str]]:
     """Names and texts that tell a user what is in a recording."""
     bin_ns = recording.bin_ns
+    length = np.percentile(found.length, (0, 50, 100))
     told = [
         ("file", str(recording.path)),
         ("format", recording.format),
         ("waveforms", f"{recording.waveforms}"),
         ("sample interval", "not in the file" if bin_ns is None else f"{bin_ns:g} ns"),
-        ("samples a waveform", _spread(np.percentile(found.length, (0, 50, 100)), 0)),
+        ("samples a waveform", _spread(length, 0)),
         ("samples", f"{int(found.length.sum(dtype=np.int64))}"),
         ("counts", f"{found.least} to {found.greatest}, {found.greatest.bit_length()} bits"),
         ("clipped", f"{found.clipped} waveforms, {found.clipped / recording.waveforms:.2%}"),
     ]
     told[3:3] = [(name, f"{count} waveforms") for name, count in recording.parts if name is not None]
+    if bin_ns is not None:
+        told.append(("length", _spread(length * bin_ns, 1) + " ns"))
     short = recording.waveforms - len(found.noise_mean)
     if short:
         told.append(("no noise", f"{short} waveforms of fewer than {NOISE_SAMPLES} samples"))
@@ -140,6 +149,8 @@ def lines(recording: Recording, found: Survey) -> list[tuple[str, str]]:
     if found.time is not None:
         first, last = found.time
         told.append(("time", f"{first:.12g} to {last:.12g} {recording.time_unit}"))
+    if found.shot is not None:
+        told.append(("shot numbers", "{} to {}".format(*found.shot)))
     return told
 
 

@@ -59,7 +59,7 @@ def draw(
     -------
     Figure
     """
-    figure = Figure(figsize=(6.5 * len(rows), 8), layout="constrained")
+    figure = Figure(figsize=(6.5 * len(rows), 8.4), layout="constrained")
     axes = figure.subplots(3, len(rows), sharex="col", squeeze=False, height_ratios=[3, 1, 1.5])
     for column, (title, row) in enumerate(rows.items()):
         waveform, residual, second = axes[:, column]
@@ -76,9 +76,19 @@ def draw(
             waveform.secondary_xaxis("top", functions=(to_ns, to_bins)).set_xlabel("ns")
     for axis, label in zip(axes[:, 0], ("counts", "raw - sum, counts", "counts/bin²"), strict=True):
         axis.set_ylabel(label)
-    axes[0, -1].legend(loc="upper right", frameon=False, fontsize=8)
-    for axis in axes[1:, -1]:
-        axis.legend(loc="best", frameon=False, fontsize=8, ncols=2)
+    # Below all panels: within one, twenty echoes or plain noise leave no room for it.
+    shown = {
+        label: handle for axis in axes.flat for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(
+        handles=list(shown.values()),
+        labels=list(shown),
+        loc="outside lower center",
+        frameon=False,
+        fontsize=8,
+        ncols=5 * len(rows),
+        columnspacing=1,
+    )
     figure.align_ylabels(axes[:, 0])
     return figure
 
@@ -117,7 +127,12 @@ def show(figure: Figure) -> None:
     windows = backend_registry.list_builtin(BackendFilter.INTERACTIVE)  # type: ignore[no-untyped-call]
     if plt.get_backend().casefold() not in windows:
         raise FigureError("found no display for a window, expected one, or -o FILE.png")
-    plt.figure(figure)  # type: ignore[arg-type, unused-ignore]
+    try:
+        plt.figure(figure)  # type: ignore[arg-type, unused-ignore]
+    except ImportError as error:
+        # Where MPLBACKEND or a matplotlibrc names a backend, nobody has yet looked whether its toolkit is installed.
+        backend = plt.get_backend()
+        raise FigureError(f"{backend}: found no toolkit for its windows, expected one, or -o FILE.png") from error
     plt.show()
 
 
