@@ -20,7 +20,7 @@ TAPS_FLAG  := $(if $(TAPS),--taps='$(TAPS)')
 SIM_FLAGS  := $(if $(MODULE),--module '$(MODULE)') $(ARITH_FLAG) $(TAPS_FLAG) $(if $(SIM),--sim '$(SIM)') \
               $(if $(DATA),--data '$(DATA)') $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(WAVES)),--waves)
 
-.PHONY: help sim replay test vectors lint format mutate synth precision score scale readme clean
+.PHONY: help sim replay test vectors lint format mutate synth coverage precision score scale readme clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -48,6 +48,9 @@ mutate: $(READY) ## break the RTL line by line and count what the benches catch
 
 synth: $(VENV)/.synth ## area on xc7, with CLOCK=1 also the clock on ECP5, of all modules and float units [MODULE=] [CLOCK=1]
 	@$(RUN) scripts/synth.py $(if $(MODULE),--module '$(MODULE)') $(if $(filter-out 0,$(CLOCK)),--clock)
+
+coverage: $(READY) ## lines and branches of the RTL that the benches reach, at least 98 %, and toggles of its bits
+	@$(RUN) scripts/coverage.py
 
 precision: $(READY) ## Monte Carlo of the echo position against the Cramér–Rao bound [SEED=]
 	@$(RUN) -m openecho.study.precision $(if $(SEED),--seed '$(SEED)')

@@ -104,19 +104,37 @@ def span(latency: dict[str, int]) -> str:
     return str(least) if least == most else f"{least} to {most}"
 
 
+PAPER = ("the paper, binary64, Vivado", 7215, "", 3389, 32, "", "")
+"""Zhou 2022, Table 3."""
+PAPER_RATE = 24_400
+"""Waveforms a second of Zhou 2022: one in 0.041 ms."""
+
+
 def area(content: dict[str, Any]) -> list[str]:
     """Area of every module, of the core in each arithmetic, and of the widest float units; clocks where measured."""
-    rows = [row for row in content["rows"] if not row["module"].startswith("float_") or row["name"].endswith("float64")]
-    if not {"core", "core float64", "float_serial float64"} <= {row["name"] for row in rows if "lut" in row}:
+    named = {row["name"]: row for row in content["rows"]}
+    if not {"core", "core without DSP", "core float64", "float_serial float64"} <= set(named):
         raise ValueError("synth.json lacks some builds, expected all: run make synth CLOCK=1")
-    head = ("build", "LUT", "of them RAM and SRL", "FF", "DSP", "ECP5, MHz")
-    return table(
-        head,
+    head = ("build", "LUT", "of them RAM and SRL", "FF", "DSP", "xc7 path, ns", "ECP5, MHz")
+    rows = [
         (
-            (row["name"], row["lut"], row["lut_ram"] + row["srl"], row["ff"], row["dsp"], row.get("mhz_median", ""))
-            for row in rows
-        ),
-    )
+            name,
+            row["lut"],
+            row["lut_ram"] + row["srl"],
+            row["ff"],
+            row["dsp"],
+            "" if row["path_ns"] is None else f"{row['path_ns']:.2f}",
+            row.get("fmax_mhz", ""),
+        )
+        for name, row in named.items()
+        if "float_" not in row["top"] or name.endswith("float64")
+    ]
+    rate = named["core"]["fmax_mhz"] * 1e6 / 1024
+    return [
+        *table(head, [*rows, PAPER]),
+        "",
+        f"At the ECP5's clock {rate:,.0f} waveforms of 1024 samples a second, the paper {PAPER_RATE:,}.",
+    ]
 
 
 def precision(content: dict[str, Any]) -> list[str]:

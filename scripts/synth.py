@@ -1,8 +1,11 @@
 """Synthesise the RTL with open tools: area on AMD's 7 series and, with --clock, the clock after routing on ECP5.
 
 Each build is out of context: a module by itself, without pins. Yosys (with slang) counts what it takes of an xc7: a LUT
-for each function and each inverter, though a packer would put two small ones into one LUT6. No open tool routes an xc7,
-so the clock is that of a Lattice ECP5, speed grade 8, by nextpnr, from register to register.
+for each function and each inverter, though a packer would put two small ones into one LUT6. Its static timing analysis
+tells the longest path between registers of an xc7 of speed grade 1, from cell delays alone: wires come on top. No open
+tool routes an xc7, so the clock is that of a Lattice ECP5, speed grade 8, by nextpnr, from register to register.
+
+A module that takes more than its budget in the module table fails.
 
 What was built is kept in build/synth/ by the hash of all that went into it: a second run is quick, and one that was
 stopped goes on. The report is build/reports/synth.json.
@@ -15,11 +18,12 @@ import hashlib
 import importlib.util
 import inspect
 import json
+import re
 import statistics
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -45,12 +49,30 @@ SHOWN_LINES = 15
 
 @dataclass(frozen=True)
 class Build:
-    """One module with one set of parameters; `clock` marks those that --clock routes."""
+    """One module with one set of parameters; `clock` marks those that --clock routes, `dsp` allows multipliers."""
 
     name: str
     module: str
     built_as: Config | FloatUnit
     clock: bool = False
+    dsp: bool = True
+
+    @property
+    def flags(self) -> str:
+        """Options of Yosys' synthesis."""
+        return "" if self.dsp else " -nodsp"
+
+    @property
+    def arithmetic(self) -> str:
+        """Name of the arithmetic, or of the float unit's format."""
+        form = self.built_as.form
+        found = {pair: name for name, pair in ARITHMETICS.items()}
+        return "fixed" if form is None else found[form.exp_w, form.frac_w]
+
+    @property
+    def budget(self) -> hardware.Area | None:
+        """What this build may take, of those for which the module table says so."""
+        return MODULES[self.module].budget if self.name == self.module else None
 
     @property
     def parameters(self) -> dict[str, str]:
@@ -79,6 +101,8 @@ FLOAT_UNITS: tuple[tuple[str, str, dict[str, int]], ...] = (
 """Units, variants and the parameters that make them."""
 BUILDS = (
     *(Build(name, name, Config(), clock=name == "core") for name in bench_names()),
+    Build("core without DSP", "core", Config(), clock=True, dsp=False),
+    *(Build(f"core FRAC {frac}", "core", Config(frac=frac)) for frac in (8, 24)),
     *(Build(f"core {name}", "core", Config().in_arithmetic(name), clock=name == "float64") for name in FLOATS),
     *(
         Build(
@@ -92,6 +116,9 @@ BUILDS = (
     ),
 )
 """All that is built."""
+
+TIMING = "read_verilog -lib -specify +/xilinx/cells_sim.v; read_rtlil xc7.il; tee -q -o timing.txt.partial sta"  # in ps
+"""Commands of a process of its own: in that of the synthesis the delays would not be found."""
 
 RAM_LUTS = {
     "RAM32X1S": 1,
@@ -204,14 +231,15 @@ def read_command(build: Build, top: str, *more: Path) -> str:
     return f"read_slang -j 1 --top {top} {chosen} {sources}"
 
 
-def area(build: Build, versions: Mapping[str, str]) -> dict[str, float]:
+def area(build: Build, versions: Mapping[str, str]) -> dict[str, float | None]:
     """What a build takes of an xc7."""
     top = MODULES[build.module].top
     commands = (
-        f"synth_xilinx -family xc7 -top {top} -flatten -noiopad; tee -q -o area.json.partial stat -json -tech xilinx"
+        f"synth_xilinx -family xc7 -top {top} -flatten -noiopad{build.flags}; write_rtlil xc7.il; "
+        "tee -q -o area.json.partial stat -json -tech xilinx"
     )
     script = f"{read_command(build, top)}; {commands}"
-    folder = kept_folder(build, versions, script)
+    folder = kept_folder(build, versions, script, TIMING)
     stat = json.loads(run(folder, "area.json", (TOOLS[0], "-p", script), build.name).read_text())
     cells: dict[str, int] = stat["design"]["num_cells_by_type"]
 
@@ -230,8 +258,16 @@ def area(build: Build, versions: Mapping[str, str]) -> dict[str, float]:
         "ff": count("FD"),
         "carry4": count("CARRY4"),
         "dsp": count("DSP48"),
-        "bram": sum(number * BRAM_36K.get(cell, 0) for cell, number in cells.items()),
+        "bram36": sum(number * BRAM_36K.get(cell, 0) for cell, number in cells.items()),
+        "path_ns": path_ns(folder, build.name),
     }
+
+
+def path_ns(folder: Path, name: str) -> float | None:
+    """Longest path between registers of an xc7 netlist, cells alone; None if there is no register in it."""
+    said = run(folder, "timing.txt", (TOOLS[0], "-p", TIMING), f"{name}, timing").read_text()
+    found = re.search(r"Latest arrival time in '\w+' is (\d+)", said)
+    return int(found[1]) / 1000 if found else None
 
 
 def wrapper(build: Build, ports: Mapping[str, Any]) -> str:
@@ -261,7 +297,7 @@ def netlist(build: Build, versions: Mapping[str, str]) -> Path:
     """Synthesise a build for ECP5 with a register on each port, and return the netlist."""
     top = MODULES[build.module].top
     elaborate = f"{read_command(build, top)}; write_json ports.json.partial"
-    synthesise = "synth_ecp5 -top wrapper -json ecp5.json.partial"
+    synthesise = f"synth_ecp5 -top wrapper{build.flags} -json ecp5.json.partial"
     folder = kept_folder(build, versions, elaborate, inspect.getsource(wrapper), synthesise, *NEXTPNR)
     ports = json.loads(run(folder, "ports.json", (TOOLS[0], "-p", elaborate), build.name).read_text())
     wrapped = folder / "wrapper.v"
@@ -292,7 +328,7 @@ def clocks(build: Build, seeds: Sequence[int], versions: Mapping[str, str], prog
         mhz[str(seed)] = clock(synthesised, seed, build.name)
         progress.advance(task)
     progress.remove_task(task)
-    return {"mhz": mhz, "mhz_median": round(statistics.median(mhz.values()), 1)}
+    return {"mhz": mhz, "fmax_mhz": round(statistics.median(mhz.values()), 1)}
 
 
 def rows(job: Job, versions: Mapping[str, str], progress: Progress) -> Iterator[dict[str, Any]]:
@@ -300,7 +336,8 @@ def rows(job: Job, versions: Mapping[str, str], progress: Progress) -> Iterator[
     task = progress.add_task("", total=len(job.builds))
     for build in job.builds:
         progress.update(task, description=build.name)
-        row = {"name": build.name, "module": build.module, "parameters": build.parameters, **area(build, versions)}
+        named = {"name": build.name, "top": MODULES[build.module].top, "arithmetic": build.arithmetic, "target": "xc7"}
+        row = {**named, "parameters": build.parameters, **area(build, versions)}
         yield row | clocks(build, job.seeds if build.clock else (), versions, progress)
         progress.advance(task)
 
@@ -309,16 +346,28 @@ def show(table_rows: Sequence[Mapping[str, Any]], console: Console) -> None:
     """Print the table, of the clock the median of the seeds."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
     table.add_column("build", no_wrap=True)
-    for column in ("LUT", "logic", "RAM", "SRL", "FF", "DSP", "BRAM", "MHz"):
+    for column in ("LUT", "logic", "RAM", "SRL", "FF", "DSP", "BRAM", "ns", "MHz"):
         table.add_column(column, justify="right", no_wrap=True)
-    keys = ("lut", "lut_logic", "lut_ram", "srl", "ff", "dsp", "bram")
+    keys = ("lut", "lut_logic", "lut_ram", "srl", "ff", "dsp", "bram36")
     for row in table_rows:
-        table.add_row(row["name"], *(f"{row[key]:g}" for key in keys), str(row.get("mhz_median", "")))
+        path = "" if row["path_ns"] is None else f"{row['path_ns']:.2f}"
+        table.add_row(row["name"], *(f"{row[key]:g}" for key in keys), path, str(row.get("fmax_mhz", "")))
     console.print(table)
 
 
+def overruns(builds: Sequence[Build], made: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What takes more than its budget."""
+    return [
+        f"{row['name']} takes {row[what]:g} {what}, expected at most {allowed:g}"
+        for build, row in zip(builds, made, strict=True)
+        if build.budget is not None
+        for what, allowed in asdict(build.budget).items()
+        if row[what] > allowed
+    ]
+
+
 def main() -> int:
-    """Return 0 if everything was built, 1 if not, 2 if it could not be tried."""
+    """Return 0 if everything was built within its budget, 1 if not, 2 if it could not be tried."""
     console = Console()
     try:
         job = parse(sys.argv[1:])
@@ -336,7 +385,10 @@ def main() -> int:
     show(made, console)
     content = {"tools": versions, "device": {"area": "xc7", "clock": "LFE5U-85F-8"}, "seeds": job.seeds, "rows": made}
     console.print(report.write("synth", content), soft_wrap=True)
-    return 0
+    over = overruns(job.builds, made)
+    for line in over:
+        print(f"error: {line}", file=sys.stderr)
+    return 1 if over else 0
 
 
 if __name__ == "__main__":

@@ -43,6 +43,26 @@ class Stream:
 
 
 @dataclass(frozen=True)
+class Area:
+    """What a module may take of an xc7, synthesised by itself with default parameters.
+
+    Attributes
+    ----------
+    lut : int
+        LUTs, those in memories and shift registers among them.
+    ff, dsp : int
+        Flip-flops, multipliers.
+    bram36 : float
+        Block RAMs of 36 kbit.
+    """
+
+    lut: int
+    ff: int
+    dsp: int = 0
+    bram36: float = 0
+
+
+@dataclass(frozen=True)
 class Module:
     """One RTL module.
 
@@ -62,6 +82,8 @@ class Module:
     latency : dict of str to callable
         For an output's prefix, the cycles from the transfer of the beat that determines an output beat to the transfer
         of that beat, in an idle module whose sink is ready: a function of the `Config`, or of the `FloatUnit`.
+    budget : Area or None
+        What it may take: what it took when this was last looked at, so that a change that makes it grow is noticed.
     """
 
     name: str
@@ -71,6 +93,7 @@ class Module:
     settings: tuple[str, ...] = ()
     golden: Callable[..., Beats | tuple[Beats, ...]] | None = None
     latency: dict[str, Callable[[Any], int]] | None = None
+    budget: Area | None = None
 
     @property
     def top(self) -> str:
@@ -201,6 +224,7 @@ MODULES: dict[str, Module] = {
             outputs=(Stream("m", _SAMPLES), _NOISE),
             golden=golden.reader,
             latency={"m": lambda _: 1},
+            budget=Area(lut=210, ff=219, dsp=1),
         ),
         Module(
             name="filter",
@@ -209,6 +233,7 @@ MODULES: dict[str, Module] = {
             outputs=(Stream("m", _SUMS),),
             golden=golden.filter,
             latency={"m": lambda _: 4},
+            budget=Area(lut=365, ff=455),
         ),
         Module(
             name="second_difference",
@@ -217,6 +242,7 @@ MODULES: dict[str, Module] = {
             outputs=(Stream("m", _DIFFERENCES),),
             golden=golden.second_difference,
             latency={"m": _second_difference_latency},
+            budget=Area(lut=54, ff=150),
         ),
         Module(
             name="inflection",
@@ -226,6 +252,7 @@ MODULES: dict[str, Module] = {
             settings=("min_interval",),
             golden=golden.inflection,
             latency={"m": lambda _: 3},
+            budget=Area(lut=661, ff=799),
         ),
         Module(
             name="parameters",
@@ -235,6 +262,7 @@ MODULES: dict[str, Module] = {
             settings=("n", "min_amplitude", "k"),
             golden=golden.parameters,
             latency={"m": _parameters_latency},
+            budget=Area(lut=622, ff=561),
         ),
         Module(
             name="output",
@@ -243,6 +271,7 @@ MODULES: dict[str, Module] = {
             outputs=(_RECORDS,),
             golden=golden.output,
             latency={"m": lambda _: 0},
+            budget=Area(lut=19, ff=48),
         ),
         Module(
             name="core",
@@ -252,6 +281,7 @@ MODULES: dict[str, Module] = {
             settings=("n", "min_interval", "min_amplitude", "k"),
             golden=golden.core,
             latency={"m": _core_latency},
+            budget=Area(lut=1901, ff=2228, dsp=1),
         ),
         Module(name="check", parameters=("SAMPLE_W", "EXP_W", "FRAC", "MAX_SAMPLES", "TAP_COUNT")),
         Module(name="interpolate", parameters=("EXP_W", "FRAC", "MAX_SAMPLES")),

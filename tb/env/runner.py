@@ -10,6 +10,7 @@ import os
 import shutil
 import subprocess
 import sys
+import uuid
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
@@ -35,6 +36,9 @@ LIMIT = 600.0
 """Seconds that a build or a simulation may take."""
 SHOWN_LINES = 15
 """Lines of a log that an error shows."""
+
+COVERAGE_VARIABLE = "OPENECHO_COVERAGE"
+"""Environment variable with the folder in which simulations by Verilator leave what lines and bits they reached."""
 
 _REQUIRED = {
     "verilator": {"g++": "g++", "make": "make", "perl": "perl"},
@@ -74,6 +78,18 @@ def require(simulator: str) -> None:
     for command in missing_commands(simulator):
         package = _REQUIRED[simulator][command]
         raise MissingToolError(f"{simulator}: {command} not found, expected it on PATH (apt-get install {package})")
+
+
+def coverage_flags() -> tuple[str, ...]:
+    """Options with which Verilator counts lines and toggles, if it is to."""
+    return ("--coverage-line", "--coverage-toggle") if COVERAGE_VARIABLE in os.environ else ()
+
+
+def coverage_plusargs() -> list[str]:
+    """What tells a simulation that was built so where to leave its counts: a file of its own."""
+    if COVERAGE_VARIABLE not in os.environ:
+        return []
+    return [f"+verilator+coverage+file+{os.environ[COVERAGE_VARIABLE]}/{uuid.uuid4()}.dat"]
 
 
 @cache
@@ -121,7 +137,7 @@ def build_with(module: str, values: dict[str, str], simulator: str, waves: bool 
     """Build a module with parameters given as SystemVerilog literals; see `build`."""
     row = MODULES[module]
     tools = tool_versions(simulator)
-    flags = _VERILATOR_FLAGS if simulator == "verilator" else ()
+    flags = (*_VERILATOR_FLAGS, *coverage_flags()) if simulator == "verilator" else ()
     if waves and simulator == "verilator":
         flags = (*flags, "--trace-fst", "-CFLAGS", f"-I{FST}", "-LDFLAGS", "-L.")
     content = [row.top, values, tools, flags, waves, [source.read_text() for source in row.sources]]
@@ -228,7 +244,7 @@ def simulate(
                 testcase=case,
                 timescale=TIMESCALE,
                 waves=waves,
-                plusargs=[f"+dumpfile_path={directory / WAVES}"] if simulator == "icarus" else [],
+                plusargs=[f"+dumpfile_path={directory / WAVES}"] if simulator == "icarus" else coverage_plusargs(),
                 extra_env={RUN_VARIABLE: str(run_file), "COCOTB_ANSI_OUTPUT": "0"},
             )
     except (RuntimeError, SystemExit) as error:
@@ -311,7 +327,8 @@ class _Verilator(_Limited, cocotb_tools.runner.Verilator):
         stubs = self._library_stubs() if self.waves else []
         # Make takes a copy that is newer than its own makefile for what it would compile itself.
         copies = [["cp", *map(str, sorted(self.runtime.glob("*.o"))), str(self.build_dir)]] * self.runtime.exists()
-        return [verilate, *copies, *stubs, make]
+        # What the makefile of a configured Verilator would know: how g++ takes the precompiled header of a large build.
+        return [verilate, *copies, *stubs, [*make, "CFG_CXXFLAGS_PCH_I=-include"]]
 
 
 def _runner(simulator: str, limit: float, tools: str = "") -> _Icarus | _Verilator:

