@@ -11,6 +11,7 @@ DATA   ?=
 SEED   ?=
 WAVES  ?=
 CLOCK  ?=
+STEP   ?=
 
 VENV   := .venv
 READY  := $(VENV)/.ready
@@ -20,7 +21,7 @@ TAPS_FLAG  := $(if $(TAPS),--taps='$(TAPS)')
 SIM_FLAGS  := $(if $(MODULE),--module '$(MODULE)') $(ARITH_FLAG) $(TAPS_FLAG) $(if $(SIM),--sim '$(SIM)') \
               $(if $(DATA),--data '$(DATA)') $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(WAVES)),--waves)
 
-.PHONY: help sim replay test vectors lint format mutate synth coverage precision score scale readme clean
+.PHONY: help sim replay test vectors lint format mutate synth vivado coverage precision score scale registers readme clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -49,6 +50,9 @@ mutate: $(READY) ## break the RTL line by line and count what the benches catch
 synth: $(VENV)/.synth ## area on xc7, with CLOCK=1 also the clock on ECP5, of all modules and float units [MODULE=] [CLOCK=1]
 	@$(RUN) scripts/synth.py $(if $(MODULE),--module '$(MODULE)') $(if $(filter-out 0,$(CLOCK)),--clock)
 
+vivado: $(READY) ## run Vivado: synthesis, routing, IP package, Zynq design [STEP=synth|impl|package|bd] [ARITH=] [TAPS=]
+	@$(RUN) scripts/vivado.py $(if $(STEP),--step '$(STEP)') $(ARITH_FLAG) $(TAPS_FLAG)
+
 coverage: $(READY) ## lines and branches of the RTL that the benches reach, at least 98 %, and toggles of its bits
 	@$(RUN) scripts/coverage.py
 
@@ -61,6 +65,9 @@ score: $(READY) ## judge the echoes of every tap set by the references that a fi
 
 scale: $(READY) ## speed and memory on a large granule, interrupted, resumed and in two processes [SEED=]
 	@$(RUN) -m openecho.study.scale $(if $(SEED),--seed '$(SEED)')
+
+registers: $(READY) ## make the SystemVerilog package, the C header and the README's table of the registers
+	@$(RUN) scripts/registers.py
 
 readme: $(READY) ## copy the figures of build/reports/ into README.md
 	@$(RUN) scripts/readme.py

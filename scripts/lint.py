@@ -42,6 +42,7 @@ def checks() -> Iterator[tuple[str, Command]]:
     yield "ruff check", [BIN / "ruff", "check", "--quiet", hardware.ROOT]
     yield "ruff format", [BIN / "ruff", "format", "--quiet", "--diff", hardware.ROOT]
     yield "mypy", [BIN / "mypy", "--no-error-summary"]
+    yield "registers", [sys.executable, hardware.ROOT / "scripts" / "registers.py", "--check"]
     rules = [f"--rules_config={WAIVERS / 'verible.rules'}", f"--waiver_files={WAIVERS / 'verible.waiver'}"]
     yield "verible lint", [BIN / "verible-verilog-lint", *rules, *SOURCES]
     for source in SOURCES:

@@ -137,7 +137,7 @@ def test_package_and_model_state_the_same_constants() -> None:
 
 def test_every_file_of_rtl_is_in_the_module_table() -> None:
     in_table = {path for row in MODULES.values() for path in row.sources}
-    assert in_table == set((ROOT / "rtl").rglob("*.sv"))
+    assert in_table == {*(ROOT / "rtl").rglob("*.sv"), *(ROOT / "rtl").rglob("*.v")}
 
 
 def test_goals_of_the_tests_are_every_bin() -> None:

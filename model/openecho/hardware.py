@@ -108,7 +108,7 @@ class Module:
     @property
     def sources(self) -> tuple[Path, ...]:
         """Files in the order of compilation: the package, what the module uses, the module."""
-        return (PACKAGE, *_sources(_file(self.top)))
+        return tuple(dict.fromkeys((PACKAGE, *_sources(_file(self.top)))))
 
     @property
     def takes_samples(self) -> bool:
@@ -283,6 +283,10 @@ MODULES: dict[str, Module] = {
             latency={"m": _core_latency},
             budget=Area(lut=1901, ff=2228, dsp=1),
         ),
+        # The core on AXI buses, verified by tb/axi
+        Module(name="axi", parameters=_ALL),
+        Module(name="axi_top", parameters=_ALL),
+        Module(name="axi_lite"),
         Module(name="check", parameters=("SAMPLE_W", "EXP_W", "FRAC", "MAX_SAMPLES", "TAP_COUNT")),
         Module(name="interpolate", parameters=("EXP_W", "FRAC", "MAX_SAMPLES")),
         Module(name="solve", parameters=_POSITIONS),
@@ -371,11 +375,12 @@ def package_constants() -> dict[str, int]:
 
 def _file(name: str) -> Path:
     """File of a module, wherever it is in the RTL."""
-    return next(RTL.rglob(f"{name}.sv"))
+    return next(path for suffix in (".sv", ".v") for path in RTL.rglob(name + suffix))
 
 
 def _sources(path: Path) -> tuple[Path, ...]:
-    """Files of the modules that a file instantiates, each after what it uses itself, then the file."""
-    used = re.findall(r"^\s*(openecho_\w+)\s*(?:#\s*\(|u_\w+)", path.read_text(), re.MULTILINE)
+    """Files of the packages and modules that a file uses, each after what it uses itself, then the file."""
+    pattern = r"^\s*(?:import\s+(openecho_\w+)::|(openecho_\w+)\s*(?:#\s*\(|u_\w+))"
+    used = [package or module for package, module in re.findall(pattern, path.read_text(), re.MULTILINE)]
     below = (source for name in used for source in _sources(_file(name)))
     return tuple(dict.fromkeys((*below, path)))
