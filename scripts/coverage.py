@@ -36,9 +36,10 @@ FLOOR = 0.98
 
 BENCHES = {
     "tb/test_rtl.py": "verilator and (default or four_taps or negative_taps or float16)",
+    "tb/test_axi.py": "axi-verilator-narrow",
     "tb/float": "verilator and exact_under",
 }
-"""What runs, and which of its tests: modules in each arithmetic and with taps of every kind, and every float unit."""
+"""What runs, and which of its tests: modules in either arithmetic, with taps of all kinds; AXI shell; float units."""
 VECTORS = "5000"
 """For each float unit: lines and bits are reached by its directed operands."""
 
