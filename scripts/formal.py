@@ -572,7 +572,7 @@ def parse(arguments: Sequence[str]) -> tuple[list[Run], int]:
         raise UsageError(f"JOBS: found {options.jobs!r}, expected a whole number from 1")
     missing = missing_package()
     if missing:
-        raise UsageError(f"{missing} is not installed: run make formal, or pip install --editable '.[synth]'")
+        raise UsageError(f"{missing} is not installed: run make formal, or pip install --editable '.[dev]'")
     return runs(rows, options.faults), int(options.jobs)
 
 

@@ -98,20 +98,11 @@ def tree(tmp_path: Path, tclsh: str) -> Tree:
 
 
 @pytest.fixture
-def with_axi(tree: Tree) -> Tree:
-    """With the AXI wrapper, without which a test fails in CI, or is skipped."""
-    if not (tree.root / WRAPPER).is_file():
-        assert "CI" not in os.environ, f"CI: {WRAPPER} not found, expected the core's AXI wrapper"
-        pytest.skip(f"{WRAPPER} not found")
-    return tree
-
-
-@pytest.fixture
-def packaged(with_axi: Tree) -> Tree:
+def packaged(tree: Tree) -> Tree:
     """With the core packaged as IP."""
-    run = with_axi.run("--step", "package")
+    run = tree.run("--step", "package")
     assert run.returncode == 0, run.stderr
-    return with_axi
+    return tree
 
 
 def assert_refused(run: subprocess.CompletedProcess[str], *said: str, status: int = 2) -> None:
@@ -275,9 +266,9 @@ def test_block_design_without_the_package_is_refused(tree: Tree) -> None:
     assert_refused(tree.run("--step", "bd"), "component.xml", "--step package")
 
 
-def test_wrapper_whose_ports_make_no_interface_is_refused(with_axi: Tree) -> None:
-    with_axi.edit(WRAPPER, "s_axis_tvalid", "s_axis_valid")
-    assert_refused(with_axi.run("--step", "package"), "s_axis", status=1)
+def test_wrapper_whose_ports_make_no_interface_is_refused(tree: Tree) -> None:
+    tree.edit(WRAPPER, "s_axis_tvalid", "s_axis_valid")
+    assert_refused(tree.run("--step", "package"), "s_axis", status=1)
 
 
 def test_missing_wrapper_is_refused(tree: Tree) -> None:
@@ -286,9 +277,9 @@ def test_missing_wrapper_is_refused(tree: Tree) -> None:
     assert_refused(tree.run("--step", "package"), "openecho_axi_top.v")
 
 
-def test_wrapper_without_a_parameter_of_the_core_is_refused(with_axi: Tree) -> None:
-    with_axi.edit(WRAPPER, "EXP_W", "EXPONENT_W")
-    assert_refused(with_axi.run("--step", "package"), "EXP_W", status=1)
+def test_wrapper_without_a_parameter_of_the_core_is_refused(tree: Tree) -> None:
+    tree.edit(WRAPPER, "EXP_W", "EXPONENT_W")
+    assert_refused(tree.run("--step", "package"), "EXP_W", status=1)
 
 
 def test_package_of_another_version_is_refused(packaged: Tree) -> None:
@@ -296,8 +287,8 @@ def test_package_of_another_version_is_refused(packaged: Tree) -> None:
     assert_refused(packaged.run("--step", "bd"), "openecho:7.0", "--step package")
 
 
-def test_package_that_vivado_finds_incomplete_fails(with_axi: Tree) -> None:
-    assert_refused(with_axi.run("--step", "package", integrity=0), "incomplete", status=1)
+def test_package_that_vivado_finds_incomplete_fails(tree: Tree) -> None:
+    assert_refused(tree.run("--step", "package", integrity=0), "incomplete", status=1)
 
 
 # ---- what makes a step fail ------------------------------------------------------------------------------------------
@@ -437,22 +428,22 @@ def test_every_port_of_the_core_but_the_clock_has_one_delay(tree: Tree) -> None:
     assert tree.call("create_clock")[-1] == "port:clk"
 
 
-def test_every_port_of_the_axi_wrapper_but_the_clock_has_one_delay(with_axi: Tree) -> None:
-    synthesise_axi(with_axi)
-    found = ports(with_axi.root / WRAPPER)
+def test_every_port_of_the_axi_wrapper_but_the_clock_has_one_delay(tree: Tree) -> None:
+    synthesise_axi(tree)
+    found = ports(tree.root / WRAPPER)
     assert found.pop("aclk") == "input"
-    assert constrained(with_axi) == sorted([direction, name] for name, direction in found.items())
-    assert with_axi.call("create_clock")[-1] == "port:aclk"
+    assert constrained(tree) == sorted([direction, name] for name, direction in found.items())
+    assert tree.call("create_clock")[-1] == "port:aclk"
 
 
-def test_constraints_name_no_port_that_neither_top_has(with_axi: Tree) -> None:
+def test_constraints_name_no_port_that_neither_top_has(tree: Tree) -> None:
     def unmatched() -> set[str]:
-        return {call[2] for call in with_axi.calls() if call[:2] == ["no_match", "port"]}
+        return {call[2] for call in tree.calls() if call[:2] == ["no_match", "port"]}
 
-    assert with_axi.run("--step", "synth").returncode == 0
+    assert tree.run("--step", "synth").returncode == 0
     of_core = unmatched()
     assert "s_axis_tvalid" in of_core
-    synthesise_axi(with_axi)
+    synthesise_axi(tree)
     assert not of_core & unmatched()
 
 
@@ -524,6 +515,6 @@ def test_script_with_a_mistake_is_refused(tree: Tree, step: str, script: str, ol
         (" -import_files", ""),
     ],
 )
-def test_packaging_with_a_mistake_is_refused(with_axi: Tree, old: str, new: str) -> None:
-    with_axi.edit("scripts/vivado/package_ip.tcl", old, new)
-    assert with_axi.run("--step", "package").returncode == 1
+def test_packaging_with_a_mistake_is_refused(tree: Tree, old: str, new: str) -> None:
+    tree.edit("scripts/vivado/package_ip.tcl", old, new)
+    assert tree.run("--step", "package").returncode == 1

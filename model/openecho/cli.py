@@ -53,7 +53,7 @@ def openecho() -> None:
 
 
 def settings(command: Callable[..., None]) -> Callable[..., None]:
-    """Options of whatever decomposes: what the core is built with and set to, as one dict `settings`."""
+    """Options of whatever decomposes: what the core is built with and set to, as `configure` takes it."""
     options = [
         click.option("--arith", "arithmetic", type=click.Choice(list(ARITHMETICS)), default="fixed", show_default=True),
         click.option("--sample-w", type=int, default=Config.sample_w, show_default=True, help="Bits of the digitiser."),

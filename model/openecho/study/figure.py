@@ -147,9 +147,10 @@ def _waveform(
         # Only where the filter lies inside the waveform, and moved back by its group delay.
         filtered = np.convolve(raw, taps, "valid")
         axes.plot(np.arange(len(filtered)) + (len(taps) - 1) / 2, filtered, color=FILTERED, lw=1.2, label="filtered")
-    for echo, width in zip(echoes, component_width(echoes), strict=True):
+    for number, width in enumerate(component_width(echoes)):
+        echo = echoes[number : number + 1]
         near = np.abs(x - echo["peak"]) < 3.5 * width
-        shape = baseline + echo["amplitude"] * np.exp(-0.5 * ((x[near] - echo["peak"]) / width) ** 2)
+        shape = _sum(echo, baseline, len(raw))[near]
         axes.fill_between(x[near], baseline, shape, color=FOUND, alpha=0.15, lw=0)
         axes.plot(x[near], shape, color=FOUND, lw=0.8, alpha=0.8)
     axes.plot([], [], color=FOUND, lw=0.9, label="echoes")
