@@ -1,8 +1,10 @@
 // Samples in, echoes out: reader, filter, second_difference, inflection, parameters and output in a row.
 //
-// One sample a clock, waveforms back to back, with the sink always ready and min_interval >= 5 whatever the waveform
-// (openecho_inflection says why). Nothing is lost under stalls: a full queue stops the input. The settings n,
-// min_interval, min_amplitude and k must not change while a waveform is in the core.
+// One sample a clock, waveforms back to back, with the sink always ready. An echo takes 90 cycles in fixed point at FRAC 16
+// (openecho_parameters), components that do not stand out of the noise 3; what comes faster waits in a queue of 16
+// components (openecho_detect). Nothing is lost: a queue that fills up stops the input, and only the input. What has been
+// taken in goes on to the queue without a stall, so that no path leads from the output back through all modules.
+// The settings n, min_interval, min_amplitude and k must not change while a waveform is in the core.
 module openecho_core
   import openecho_pkg::*;
 #(
@@ -12,6 +14,7 @@ module openecho_core
     parameter int MAX_SAMPLES = 4096,
     parameter int TAP_COUNT = PAPER_TAP_COUNT,
     parameter logic [TAPS_W-1:0] TAPS = PAPER_TAPS,
+    parameter bit DSP = 1'b1,  // of openecho_noise
     localparam int INDEX_W = $clog2(MAX_SAMPLES),
     localparam int WORD_W = record_word_width(SAMPLE_W, EXP_W, FRAC, MAX_SAMPLES)
 ) (
@@ -34,31 +37,39 @@ module openecho_core
   localparam int POSITION_W = position_width(EXP_W, FRAC, MAX_SAMPLES);
   localparam int VALUE_W = value_width(SAMPLE_W, EXP_W, FRAC, MAX_SAMPLES);
   localparam int SUM_W = response_width(TAPS, TAP_COUNT, 0, SAMPLE_W);
+  localparam int RISE_W = response_width(TAPS, TAP_COUNT, 1, SAMPLE_W);
   localparam int FIRST_W = difference_width(TAPS, TAP_COUNT, 1, SAMPLE_W, EXP_W, FRAC);
   localparam int SECOND_W = difference_width(TAPS, TAP_COUNT, 2, SAMPLE_W, EXP_W, FRAC);
+
+  // Beats that are between the reader and the queue, and so still come when there is no more room: filter, difference,
+  // and in floating point those that its conversion can hold.
+  localparam int IN_FLIGHT = EXP_W > 0 ? 16 : 7;
+  logic room, reader_ready, unused_sum_ready;
+  assign s_ready = reader_ready && room;
 
   logic sample_valid, sample_ready, sample_last, sample_overlong;
   logic [SAMPLE_W-1:0] sample;
   logic [ INDEX_W-1:0] sample_index;
 
-  logic noise_valid, noise_ready, noise_none;
-  logic [AMP_W-1:0] noise_mean, noise_deviation;
+  logic noise_valid, noise_ready, noise_none, figures_valid, figures_ready, figures_none;
+  logic [AMP_W-1:0] noise_mean, noise_deviation, figures_mean, figures_deviation;
 
-  logic sum_valid, sum_ready, sum_last, sum_overlong;
-  logic signed [SUM_W-1:0] sum;
+  logic sum_valid, sum_last, sum_overlong;
+  logic signed [SUM_W-1:0] unused_sum;
+  logic signed [RISE_W-1:0] rise;
   logic [SAMPLE_W-1:0] sum_raw;
   logic [INDEX_W-1:0] sum_index;
 
-  logic second_valid, second_ready, second_last, second_overlong;
+  logic second_valid, second_last, second_overlong;
   logic signed [FIRST_W-1:0] first;
   logic signed [SECOND_W-1:0] second;
   logic [SAMPLE_W-1:0] second_raw;
-  logic [INDEX_W-1:0] second_index;
+  logic [INDEX_W-1:0] unused_index;
 
   logic component_valid, component_ready, component_last;
   logic [POSITION_W-1:0] component_left, component_right, component_peak;
-  logic [SAMPLE_W-1:0] component_maximum;
-  logic [INDEX_W:0] component_length;
+  logic [AMP_W-1:0] component_amplitude, component_mean;
+  logic [  INDEX_W:0] component_length;
   logic [FLAGS_W-1:0] component_flags;
 
   logic echo_valid, echo_ready, echo_last;
@@ -68,12 +79,13 @@ module openecho_core
 
   openecho_reader #(
       .SAMPLE_W(SAMPLE_W),
-      .MAX_SAMPLES(MAX_SAMPLES)
+      .MAX_SAMPLES(MAX_SAMPLES),
+      .DSP(DSP)
   ) u_reader (
       .clk,
       .rst,
-      .s_valid,
-      .s_ready,
+      .s_valid(s_valid && room),
+      .s_ready(reader_ready),
       .s_last,
       .s_sample,
       .m_valid(sample_valid),
@@ -104,9 +116,10 @@ module openecho_core
       .s_index(sample_index),
       .s_overlong(sample_overlong),
       .m_valid(sum_valid),
-      .m_ready(sum_ready),
+      .m_ready(1'b1),
       .m_last(sum_last),
-      .m_sum(sum),
+      .m_sum(unused_sum),
+      .m_first(rise),
       .m_raw(sum_raw),
       .m_index(sum_index),
       .m_overlong(sum_overlong)
@@ -123,21 +136,45 @@ module openecho_core
       .clk,
       .rst,
       .s_valid(sum_valid),
-      .s_ready(sum_ready),
+      .s_ready(unused_sum_ready),
       .s_last(sum_last),
-      .s_sum(sum),
+      .s_first(rise),
       .s_raw(sum_raw),
       .s_index(sum_index),
       .s_overlong(sum_overlong),
       .m_valid(second_valid),
-      .m_ready(second_ready),
+      .m_ready(1'b1),
       .m_last(second_last),
       .m_first(first),
       .m_second(second),
       .m_raw(second_raw),
-      .m_index(second_index),
+      .m_index(unused_index),
       .m_overlong(second_overlong)
   );
+
+  // An echo takes long in floating point: the noise figures of waveforms that have come meanwhile wait here.
+  if (EXP_W == 0) begin : g_figures
+    assign {figures_valid, figures_mean, figures_deviation, figures_none} = {
+      noise_valid, noise_mean, noise_deviation, noise_none
+    };
+    assign noise_ready = figures_ready;
+  end else begin : g_figures
+    logic [4:0] unused_figures;
+    openecho_fifo #(
+        .WIDTH(2 * AMP_W + 1),
+        .DEPTH(16)
+    ) u_figures (
+        .clk,
+        .rst,
+        .s_valid(noise_valid),
+        .s_ready(noise_ready),
+        .s_data ({noise_mean, noise_deviation, noise_none}),
+        .m_valid(figures_valid),
+        .m_ready(figures_ready),
+        .m_data ({figures_mean, figures_deviation, figures_none}),
+        .level  (unused_figures)
+    );
+  end
 
   openecho_inflection #(
       .SAMPLE_W(SAMPLE_W),
@@ -145,18 +182,25 @@ module openecho_core
       .FRAC(FRAC),
       .MAX_SAMPLES(MAX_SAMPLES),
       .TAP_COUNT(TAP_COUNT),
-      .TAPS(TAPS)
+      .TAPS(TAPS),
+      .IN_FLIGHT(IN_FLIGHT)
   ) u_inflection (
       .clk,
       .rst,
       .min_interval,
+      .min_amplitude,
+      .k,
+      .noise_valid(figures_valid),
+      .noise_ready(figures_ready),
+      .noise_mean(figures_mean),
+      .noise_deviation(figures_deviation),
+      .noise_none(figures_none),
       .s_valid(second_valid),
-      .s_ready(second_ready),
+      .s_ready(room),
       .s_last(second_last),
       .s_first(first),
       .s_second(second),
       .s_raw(second_raw),
-      .s_index(second_index),
       .s_overlong(second_overlong),
       .m_valid(component_valid),
       .m_ready(component_ready),
@@ -164,8 +208,9 @@ module openecho_core
       .m_left(component_left),
       .m_right(component_right),
       .m_peak(component_peak),
-      .m_maximum(component_maximum),
+      .m_amplitude(component_amplitude),
       .m_length(component_length),
+      .m_mean(component_mean),
       .m_flags(component_flags)
   );
 
@@ -178,21 +223,15 @@ module openecho_core
       .clk,
       .rst,
       .n,
-      .min_amplitude,
-      .k,
-      .noise_valid,
-      .noise_ready,
-      .noise_mean,
-      .noise_deviation,
-      .noise_none,
       .s_valid(component_valid),
       .s_ready(component_ready),
       .s_last(component_last),
       .s_left(component_left),
       .s_right(component_right),
       .s_peak(component_peak),
-      .s_maximum(component_maximum),
+      .s_amplitude(component_amplitude),
       .s_length(component_length),
+      .s_mean(component_mean),
       .s_flags(component_flags),
       .m_valid(echo_valid),
       .m_ready(echo_ready),

@@ -22,7 +22,7 @@ module openecho_fifo #(
   logic [ADDRESS_W:0] write_q, read_q;  // one bit more than the address tells full from empty
 
   assign level   = write_q - read_q;
-  assign s_ready = !level[ADDRESS_W];
+  assign s_ready = write_q != {!read_q[ADDRESS_W], read_q[ADDRESS_W-1:0]};
   assign m_valid = write_q != read_q;
   assign m_data  = memory[read_q[ADDRESS_W-1:0]];
 
@@ -35,8 +35,8 @@ module openecho_fifo #(
       write_q <= '0;
       read_q  <= '0;
     end else begin
-      write_q <= write_q + (ADDRESS_W + 1)'(s_valid && s_ready);
-      read_q  <= read_q + (ADDRESS_W + 1)'(m_valid && m_ready);
+      if (s_valid && s_ready) write_q <= write_q + 1'b1;
+      if (m_valid && m_ready) read_q <= read_q + 1'b1;
     end
   end
 endmodule

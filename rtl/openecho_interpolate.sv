@@ -1,22 +1,28 @@
-// position = base + |y| / (|y| + |y'|): where the line from y at `base` to y' a bin later, of opposite signs, crosses
-// zero (Zhou 2022, Eqs (4) and (5), corrected). One of the two may be zero, not both.
+// position = base + |y| / (|y| + |y'|): where the line from y at `base` to y' a bin later, of opposite signs, crosses zero
+// (Zhou 2022, Eqs (4) and (5), corrected). One of the two may be zero, not both. With s_edge set it is base + 1, whatever
+// y and y'.
 //
-// base = s_index, and half a bin more if s_half is set: of the oldest operation that has no position yet, while
-// s_base_valid is set. Positions leave in the order of their operations.
+// base = s_bin, and half a bin more if TAP_COUNT is even, and half a bin more for a peak (openecho_detect).
 //
-// Fixed point (EXP_W 0): one openecho_divide, its rows going round twice. Rounded half up to FRAC bits. Latency 1 cycle
-// and the rows of the divider, FRAC + 2 cycles for even FRAC; an operation each LOOPS = 2 cycles.
+// Operands stand still while s_valid is set, until s_ready; a position is there for the cycle in which m_valid is set. They
+// come in the order of their operations.
 //
-// Floating point: sum, quotient and position are each rounded to nearest even. Crossings are sparse, so there is one
-// serial divider and one serial adder, which forms the sum for the next division while one is under way: the divider
-// sets the pace. `base` is exact where FRAC + 1 bits hold it, else rounded. No infinity or NaN: |y| + |y'| is neither
-// zero nor beyond the format (openecho_check), quotients are in [0, 1], and so is what is added to an index.
+// Fixed point (EXP_W 0): rounded half up to FRAC bits. One adder: it forms |y'|, twice |y| + |y'|, twice |y|, and then a
+// quotient bit a clock, non-restoring: a negative remainder means that the last subtraction was one too many, so the next
+// step adds. Where |y'| is zero, or both at the edge, the quotient is all ones, which is 1 after rounding. FRAC + 6
+// cycles, for which the operands stay.
+//
+// Floating point: sum, quotient and position are each rounded to nearest even. One serial divider and one serial adder,
+// which forms the sum for the next division while one is under way: the divider sets the pace. `base` is exact where
+// FRAC + 1 bits hold it, else rounded. No infinity or NaN: |y| + |y'| is neither zero nor beyond the format
+// (openecho_check), quotients are in [0, 1], and so is what is added to a base.
 module openecho_interpolate
   import openecho_pkg::*;
 #(
     parameter int EXP_W = 0,
     parameter int FRAC = 16,
     parameter int MAX_SAMPLES = 4096,
+    parameter int TAP_COUNT = PAPER_TAP_COUNT,
     parameter int VALUE_W = EXP_W > 0 ? float_width(EXP_W, FRAC) : 19,
     localparam int INDEX_W = $clog2(MAX_SAMPLES),
     localparam int POSITION_W = position_width(EXP_W, FRAC, MAX_SAMPLES)
@@ -24,67 +30,101 @@ module openecho_interpolate
     input  logic                         clk,
     input  logic                         rst,
     input  logic                         s_valid,
-    output logic                         s_ready,
+    input  logic        [           1:0] s_crossing,
+    input  logic                         s_edge,
+    input  logic        [   INDEX_W-1:0] s_bin,
     input  logic signed [   VALUE_W-1:0] s_y,
     input  logic signed [   VALUE_W-1:0] s_y_next,
-    input  logic                         s_base_valid,
-    input  logic        [   INDEX_W-1:0] s_index,
-    input  logic                         s_half,
+    output logic                         s_ready,
     output logic                         m_valid,
-    input  logic                         m_ready,
     output logic        [POSITION_W-1:0] m_position
 );
+  localparam bit EVEN = TAP_COUNT % 2 == 0;
+
   if (EXP_W == 0) begin : g_fixed
-    localparam int LOOPS = 2;  // see the throughput of openecho_inflection
-    localparam logic [FRAC-1:0] HALF_BIN = {1'b1, {(FRAC - 1) {1'b0}}};
+    localparam int QUO_W = FRAC + 1;  // one bit below FRAC, for rounding
+    localparam int STEP_W = $clog2(QUO_W + 4);
+    localparam int ADDER_W = VALUE_W + 2;
 
-    // By the sign of y alone: -y and y' - y, or y and y - y'. Where y is zero and y' positive, the second form makes a
-    // wrong denominator; it is not zero, and the quotient, 0, is right.
-    logic minus, operands_valid_q, operands_ready, unused_carry;
-    logic [VALUE_W-1:0] num, den, num_q, den_q;
-    assign minus = s_y[VALUE_W-1];
-    assign num = (s_y ^ {VALUE_W{minus}}) + VALUE_W'(minus);
-    assign {den, unused_carry} = {s_y ^ {VALUE_W{minus}}, 1'b1} + {s_y_next ^ {VALUE_W{!minus}}, 1'b1};
-    assign s_ready = !operands_valid_q || operands_ready;
+    logic [STEP_W-1:0] step_q;
+    logic start, next_q, sum_q, value_q, done_q;  // |y'|, 2 (|y| + |y'|), 2 |y| is formed; the quotient is there
+    logic twice_q;  // sum_q or value_q
+    logic peak_q, rising_q, add_q;
+    logic [INDEX_W-1:0] bin_q;
+    logic signed [VALUE_W-1:0] y_q, y_next_q;
+    logic [ADDER_W-1:0] divisor_q, operand, sum;
+    logic [ADDER_W-2:0] remainder_q;  // without its sign, which is add_q
+    logic [QUO_W-1:0] quotient_q;
+    logic unused_borrow;
 
-    always_ff @(posedge clk) begin
-      if (rst) operands_valid_q <= 1'b0;
-      else if (s_ready) operands_valid_q <= s_valid;
-      if (s_ready) begin
-        num_q <= num;
-        den_q <= den;
-      end
+    assign start = step_q == '0;
+
+    always_comb begin
+      operand = divisor_q;
+      if (next_q) operand = ADDER_W'(y_next_q);
+      if (twice_q) operand = ADDER_W'(y_q) <<< 1;
     end
 
-    logic quotient_valid;
-    logic [FRAC:0] quotient;  // one bit below FRAC, for rounding
-    openecho_divide #(
-        .DEN_W (VALUE_W),
-        .QUO_W (FRAC + 1),
-        .STAGES((FRAC + LOOPS) / LOOPS)
-    ) u_divide (
+    assign {sum, unused_borrow} = {remainder_q, 2'b0} - {operand ^ {ADDER_W{add_q}}, add_q};
+
+    always_ff @(posedge clk) begin
+      if (rst || !s_valid || done_q) step_q <= '0;
+      else step_q <= step_q + 1'b1;
+      twice_q <= next_q || sum_q;
+      {value_q, sum_q, next_q} <= rst ? '0 : {sum_q, next_q, s_valid && start && !done_q};
+      done_q <= !rst && step_q == STEP_W'(QUO_W + 3);
+      if (start) begin
+        peak_q <= s_crossing == CROSSING_PEAK;
+        rising_q <= s_crossing == CROSSING_RIGHT;
+        bin_q <= s_bin;
+        y_q <= s_edge ? '0 : s_y;
+        y_next_q <= s_edge ? '0 : s_y_next;
+      end
+      if (sum_q) divisor_q <= sum;
+      remainder_q <= start || sum_q ? '0 : sum[ADDER_W-2:0];
+      if (start) add_q <= s_crossing == CROSSING_RIGHT;
+      else if (next_q || sum_q) add_q <= !rising_q;
+      else add_q <= !value_q && sum[ADDER_W-1];
+      if (!done_q) quotient_q <= {quotient_q[QUO_W-2:0], !sum[ADDER_W-1]};
+    end
+
+    logic unused_half;
+    assign s_ready = done_q;
+    assign m_valid = done_q;
+    assign {m_position, unused_half} = {bin_q, peak_q != EVEN, FRAC'(1)} + {INDEX_W'(peak_q && EVEN), quotient_q};
+  end else begin : g_float
+    localparam logic [POSITION_W-1:0] TWO = POSITION_W'(1) << (POSITION_W - 2);
+
+    // Magnitudes. At the edge: 0 / (0 + 2), a bin later.
+    logic [POSITION_W-1:0] y, y_next;
+    logic [INDEX_W+1:0] half_bins;
+    always_comb begin
+      y = s_edge ? '0 : POSITION_W'(s_y);
+      y_next = s_edge ? TWO : POSITION_W'(s_y_next);
+      {y[POSITION_W-1], y_next[POSITION_W-1]} = '0;
+      half_bins = {1'b0, s_bin, EVEN} + (INDEX_W + 2)'(s_crossing == CROSSING_PEAK) + {INDEX_W'(0), s_edge, 1'b0};
+    end
+
+    // ---- base, once for each operation, of the oldest that has no position yet ----------------------------------------
+    logic add_position, add_valid;
+    logic base_waits, unused_bases_ready;
+    logic [INDEX_W+1:0] base_half_bins;
+    logic [1:0] unused_bases;
+    openecho_fifo #(
+        .WIDTH(INDEX_W + 2),
+        .DEPTH(2)
+    ) u_bases (
         .clk,
         .rst,
-        .s_valid(operands_valid_q),
-        .s_ready(operands_ready),
-        .s_head(num_q),
-        .s_tail({(FRAC + 1) {1'b0}}),
-        .s_den(den_q),
-        .m_valid(quotient_valid),
-        .m_ready(m_ready && s_base_valid),
-        .m_quotient(quotient)
+        .s_valid(add_valid && !add_position),
+        .s_ready(unused_bases_ready),
+        .s_data (half_bins),
+        .m_valid(base_waits),
+        .m_ready(m_valid),
+        .m_data (base_half_bins),
+        .level  (unused_bases)
     );
 
-    assign m_valid = quotient_valid && s_base_valid;
-    assign m_position = {s_index, s_half ? HALF_BIN : FRAC'(0)}
-                      + POSITION_W'(quotient[FRAC:1]) + POSITION_W'(quotient[0]);
-  end else begin : g_float
-    localparam logic [POSITION_W-1:0] NO_SIGN = {1'b0, {(POSITION_W - 1) {1'b1}}};
-    logic [POSITION_W-1:0] magnitude, magnitude_next;
-    assign magnitude = POSITION_W'(s_y) & NO_SIGN;
-    assign magnitude_next = POSITION_W'(s_y_next) & NO_SIGN;
-
-    // ---- base, once for each operation --------------------------------------------------------------------------------
     logic base_sent_q, base_ready, base_valid, position_added;
     logic [POSITION_W-1:0] base;
     logic [4:0] unused_base_flags;
@@ -97,9 +137,9 @@ module openecho_interpolate
     ) u_base (
         .clk,
         .rst,
-        .s_valid (s_base_valid && !base_sent_q),
+        .s_valid (base_waits && !base_sent_q),
         .s_ready (base_ready),
-        .s_value ({1'b0, s_index, s_half}),
+        .s_value (base_half_bins),
         .m_valid (base_valid),
         .m_ready (position_added),
         .m_result(base),
@@ -112,14 +152,14 @@ module openecho_interpolate
     // the quotient. With two, adder and divider could wait for each other.
     logic adding_q, sum_sent_q, total_is_position_q;
     logic [1:0] dividing_q;  // operations whose division has begun and whose position has not
-    logic add_position, add_valid, unused_add_ready, total_valid, total_taken, quotient_valid, divide_ready;
+    logic unused_add_ready, total_valid, total_taken, quotient_valid, divide_ready;
     logic [POSITION_W-1:0] total, quotient;
     logic [4:0] unused_add_flags, unused_divide_flags;
 
     assign add_position = quotient_valid && base_valid;
     assign add_valid = !adding_q && (add_position || (s_valid && !sum_sent_q && !dividing_q[1]));
     assign position_added = add_position && add_valid;
-    assign total_taken = total_valid && (total_is_position_q ? m_ready : divide_ready);
+    assign total_taken = total_valid && (total_is_position_q || divide_ready);
 
     always_ff @(posedge clk) begin
       if (rst) begin
@@ -128,8 +168,8 @@ module openecho_interpolate
         sum_sent_q <= 1'b0;
         dividing_q <= '0;
       end else begin
-        if (m_valid && m_ready) base_sent_q <= 1'b0;
-        else if (s_base_valid && base_ready) base_sent_q <= 1'b1;
+        if (m_valid) base_sent_q <= 1'b0;
+        else if (base_waits && base_ready) base_sent_q <= 1'b1;
         if (total_taken) adding_q <= 1'b0;
         else if (add_valid) adding_q <= 1'b1;
         if (s_ready) sum_sent_q <= 1'b0;
@@ -148,8 +188,8 @@ module openecho_interpolate
         .rst,
         .s_valid(add_valid),
         .s_ready(unused_add_ready),
-        .s_a(add_position ? base : magnitude),
-        .s_b(add_position ? quotient : magnitude_next),
+        .s_a(add_position ? base : y),
+        .s_b(add_position ? quotient : y_next),
         .s_subtract(1'b0),
         .m_valid(total_valid),
         .m_ready(total_taken),
@@ -166,7 +206,7 @@ module openecho_interpolate
         .rst,
         .s_valid(total_valid && !total_is_position_q),
         .s_ready(divide_ready),
-        .s_a(magnitude),
+        .s_a(y),
         .s_b(total),
         .m_valid(quotient_valid),
         .m_ready(position_added),

@@ -40,14 +40,14 @@ module openecho_output
   assign s_ready = m_ready;
   assign m_last  = s_last;
 
+  logic accept;
+  assign accept = s_valid && s_ready;
+
   always_ff @(posedge clk) begin
-    if (rst) begin
-      sequence_q <= '0;
-      number_q   <= '0;
-    end else if (s_valid && s_ready) begin
-      sequence_q <= sequence_q + SEQUENCE_W'(s_last);
-      number_q   <= s_last ? '0 : number_q + 1'b1;
-    end
+    if (rst) sequence_q <= '0;
+    else if (accept && s_last) sequence_q <= sequence_q + 1'b1;
+    if (rst || (accept && s_last)) number_q <= '0;
+    else if (accept) number_q <= number_q + 1'b1;
   end
 
   always_comb begin

@@ -94,6 +94,12 @@ package openecho_pkg;
     if (value_width < $clog2(max_samples) + 1) value_width = $clog2(max_samples) + 1;
   endfunction
 
+  // ---- zeros of the differences that make a component --------------------------------------------------------------
+  localparam logic [1:0] CROSSING_LEFT = 2'd0;  // of the second difference, from + to -
+  localparam logic [1:0] CROSSING_PEAK = 2'd1;  // of the first difference, from + to -
+  localparam logic [1:0] CROSSING_RIGHT = 2'd2;  // of the second difference, from - to +
+  localparam logic [1:0] CROSSING_NONE = 2'd3;
+
   // ---- flags ------------------------------------------------------------------------------------------------------
   localparam int FLAGS_W = 3;
   // of an echo

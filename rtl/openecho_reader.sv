@@ -9,7 +9,8 @@ module openecho_reader
   import openecho_pkg::*;
 #(
     parameter int SAMPLE_W = 11,
-    parameter int MAX_SAMPLES = 4096
+    parameter int MAX_SAMPLES = 4096,
+    parameter bit DSP = 1'b1  // see openecho_noise
 ) (
     input  logic                           clk,
     input  logic                           rst,
@@ -67,7 +68,8 @@ module openecho_reader
 
   openecho_noise #(
       .SAMPLE_W(SAMPLE_W),
-      .MAX_SAMPLES(MAX_SAMPLES)
+      .MAX_SAMPLES(MAX_SAMPLES),
+      .DSP(DSP)
   ) u_noise (
       .clk,
       .rst,

@@ -1,12 +1,13 @@
-// first[i] = sum[i] - sum[i-1] and second[i] = sum[i] - 2 sum[i-1] + sum[i-2], exact, with zeros before the waveform
-// (Zhou 2022, Eq (2)). Later modules look at `second` from sample TAP_COUNT + 1 on, where the window is full.
+// second[i] = first[i] - first[i-1] = sum[i] - 2 sum[i-1] + sum[i-2], exact, with zeros before the waveform (Zhou 2022,
+// Eq (2)), from the first differences that the filter's sum grows by, which it passes along. Later modules look at
+// `second` from sample TAP_COUNT + 1 on, where the window is full.
 //
 // In floating point both then become words, times 2^-11 (the scale of Eq (11), which the filter leaves out) in the same
 // rounding, so that no format overflows on the way. 2^-11 is a normal number: none becomes zero.
 //
-// Latency 2 cycles, in floating point 2 and those of openecho_float_from_int; one sample a clock. The integers have as
-// many bits as any response of the differenced taps needs, for smooth taps fewer than the sum has: the differences are
-// taken modulo that many bits from the start.
+// Latency 1 cycle, in floating point 1 and those of openecho_float_from_int; one sample a clock. The integers have as
+// many bits as any response of the differenced taps needs, for smooth taps fewer than the sum has: differences are taken
+// modulo that many bits.
 module openecho_second_difference
   import openecho_pkg::*;
 #(
@@ -16,30 +17,29 @@ module openecho_second_difference
     parameter int MAX_SAMPLES = 4096,
     parameter int TAP_COUNT = PAPER_TAP_COUNT,
     parameter logic [TAPS_W-1:0] TAPS = PAPER_TAPS,
-    localparam int SUM_W = response_width(TAPS, TAP_COUNT, 0, SAMPLE_W),
+    localparam int FIRST_INT_W = response_width(TAPS, TAP_COUNT, 1, SAMPLE_W),
     localparam int FIRST_W = difference_width(TAPS, TAP_COUNT, 1, SAMPLE_W, EXP_W, FRAC),
     localparam int SECOND_W = difference_width(TAPS, TAP_COUNT, 2, SAMPLE_W, EXP_W, FRAC),
     localparam int INDEX_W = $clog2(MAX_SAMPLES)
 ) (
-    input  logic                       clk,
-    input  logic                       rst,
-    input  logic                       s_valid,
-    output logic                       s_ready,
-    input  logic                       s_last,
-    input  logic signed [   SUM_W-1:0] s_sum,
-    input  logic        [SAMPLE_W-1:0] s_raw,
-    input  logic        [ INDEX_W-1:0] s_index,
-    input  logic                       s_overlong,
-    output logic                       m_valid,
-    input  logic                       m_ready,
-    output logic                       m_last,
-    output logic signed [ FIRST_W-1:0] m_first,
-    output logic signed [SECOND_W-1:0] m_second,
-    output logic        [SAMPLE_W-1:0] m_raw,
-    output logic        [ INDEX_W-1:0] m_index,
-    output logic                       m_overlong
+    input  logic                          clk,
+    input  logic                          rst,
+    input  logic                          s_valid,
+    output logic                          s_ready,
+    input  logic                          s_last,
+    input  logic signed [FIRST_INT_W-1:0] s_first,
+    input  logic        [   SAMPLE_W-1:0] s_raw,
+    input  logic        [    INDEX_W-1:0] s_index,
+    input  logic                          s_overlong,
+    output logic                          m_valid,
+    input  logic                          m_ready,
+    output logic                          m_last,
+    output logic signed [    FIRST_W-1:0] m_first,
+    output logic signed [   SECOND_W-1:0] m_second,
+    output logic        [   SAMPLE_W-1:0] m_raw,
+    output logic        [    INDEX_W-1:0] m_index,
+    output logic                          m_overlong
 );
-  localparam int FIRST_INT_W = response_width(TAPS, TAP_COUNT, 1, SAMPLE_W);
   localparam int SECOND_INT_W = response_width(TAPS, TAP_COUNT, 2, SAMPLE_W);
   localparam int INT_W = FIRST_INT_W > SECOND_INT_W ? FIRST_INT_W : SECOND_INT_W;
 
@@ -56,48 +56,40 @@ module openecho_second_difference
   logic advance;
   assign s_ready = advance;
 
-  logic valid_q, last_q, overlong_q, valid_q2, last_q2, overlong_q2;
-  logic [SAMPLE_W-1:0] raw_q, raw_q2;
-  logic [INDEX_W-1:0] index_q, index_q2;
-  logic signed [FIRST_INT_W-1:0] sum_before_q, first_q, first_q2;
-  logic signed [SECOND_INT_W-1:0] first_before_q, second_q2;
+  logic fresh_q;  // the next beat is the first of its waveform
+  logic valid_q, last_q, overlong_q;
+  logic [SAMPLE_W-1:0] raw_q;
+  logic [INDEX_W-1:0] index_q;
+  logic signed [FIRST_INT_W-1:0] first_q;  // of the last beat that came, and so of the one before
+  logic signed [SECOND_INT_W-1:0] second_q;
 
   always_ff @(posedge clk) begin
     if (rst) begin
-      valid_q  <= 1'b0;
-      valid_q2 <= 1'b0;
+      valid_q <= 1'b0;
+      fresh_q <= 1'b1;
     end else if (advance) begin
-      valid_q  <= s_valid;
-      valid_q2 <= valid_q;
+      valid_q <= s_valid;
+      if (s_valid) fresh_q <= s_last;
     end
-    if (advance) begin
-      // stage 1
+    if (advance && s_valid) begin
       last_q <= s_last;
       raw_q <= s_raw;
       index_q <= s_index;
       overlong_q <= s_overlong;
-      first_q <= FIRST_INT_W'(s_sum) - (s_index == '0 ? FIRST_INT_W'(0) : sum_before_q);
-      if (s_valid) sum_before_q <= FIRST_INT_W'(s_sum);
-      // stage 2
-      last_q2 <= last_q;
-      raw_q2 <= raw_q;
-      index_q2 <= index_q;
-      overlong_q2 <= overlong_q;
-      first_q2 <= first_q;
-      second_q2 <= SECOND_INT_W'(first_q) - (index_q == '0 ? SECOND_INT_W'(0) : first_before_q);
-      if (valid_q) first_before_q <= SECOND_INT_W'(first_q);
+      first_q <= s_first;
+      second_q <= SECOND_INT_W'(s_first) - (fresh_q ? SECOND_INT_W'(0) : SECOND_INT_W'(first_q));
     end
   end
 
   if (EXP_W == 0) begin : g_fixed
-    assign advance = !valid_q2 || m_ready;
-    assign m_valid = valid_q2;
-    assign m_last = last_q2;
-    assign m_first = first_q2;
-    assign m_second = second_q2;
-    assign m_raw = raw_q2;
-    assign m_index = index_q2;
-    assign m_overlong = overlong_q2;
+    assign advance = !valid_q || m_ready;
+    assign m_valid = valid_q;
+    assign m_last = last_q;
+    assign m_first = first_q;
+    assign m_second = second_q;
+    assign m_raw = raw_q;
+    assign m_index = index_q;
+    assign m_overlong = overlong_q;
   end else begin : g_float
     // ---- words; what belongs to them waits in a queue beside ----------------------------------------------------------
     localparam int BESIDE_W = 2 + SAMPLE_W + INDEX_W;
@@ -106,8 +98,8 @@ module openecho_second_difference
     logic [4:0] unused_first_flags, unused_second_flags;
     logic [$clog2(BESIDE_DEPTH):0] unused_level;
 
-    assign advance = !valid_q2 || (first_ready && second_ready && beside_ready);
-    assign push = valid_q2 && advance;
+    assign advance = !valid_q || (first_ready && second_ready && beside_ready);
+    assign push = valid_q && advance;
     assign m_valid = first_valid && second_valid && beside_valid;
     assign pop = m_valid && m_ready;
 
@@ -121,7 +113,7 @@ module openecho_second_difference
         .rst,
         .s_valid (push),
         .s_ready (first_ready),
-        .s_value (INT_W'(first_q2)),
+        .s_value (INT_W'(first_q)),
         .m_valid (first_valid),
         .m_ready (pop),
         .m_result(m_first),
@@ -138,7 +130,7 @@ module openecho_second_difference
         .rst,
         .s_valid (push),
         .s_ready (second_ready),
-        .s_value (INT_W'(second_q2)),
+        .s_value (INT_W'(second_q)),
         .m_valid (second_valid),
         .m_ready (pop),
         .m_result(m_second),
@@ -153,7 +145,7 @@ module openecho_second_difference
         .rst,
         .s_valid(push),
         .s_ready(beside_ready),
-        .s_data ({last_q2, overlong_q2, raw_q2, index_q2}),
+        .s_data ({last_q, overlong_q, raw_q, index_q}),
         .m_valid(beside_valid),
         .m_ready(pop),
         .m_data ({m_last, m_overlong, m_raw, m_index}),

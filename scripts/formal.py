@@ -114,14 +114,14 @@ FIFO_FAULTS = (
     Change(
         "a full queue takes one word more",
         "openecho_fifo.sv",
-        "assign s_ready = !level[ADDRESS_W];",
+        "assign s_ready = write_q != {!read_q[ADDRESS_W], read_q[ADDRESS_W-1:0]};",
         "assign s_ready = level <= (ADDRESS_W + 1)'(DEPTH);",
     ),
     Change(
         "an empty queue hands out a word",
         "openecho_fifo.sv",
-        "(ADDRESS_W + 1)'(m_valid && m_ready);",
-        "(ADDRESS_W + 1)'(m_ready);",
+        "if (m_valid && m_ready) read_q <= read_q + 1'b1;",
+        "if (m_ready) read_q <= read_q + 1'b1;",
     ),
     Change(
         "words leave out of order",
@@ -154,7 +154,7 @@ NOISE_FAULTS = (
     Change(
         "samples overwrite figures that are at work",
         "openecho_noise.sv",
-        "assign s_ready = token_ready && !(at_limit && held_q);",
+        "assign s_ready = token_ready && !(at_limit_q && held_q);",
         "assign s_ready = token_ready;",
     ),
     Change(
@@ -165,35 +165,87 @@ NOISE_FAULTS = (
     ),
 )
 SHORT_NOISE = Change(
-    "a window of 6 samples",
+    "a window of 8 samples",
     "openecho_pkg.sv",
     "localparam int NOISE_SAMPLES = 50;",
-    "localparam int NOISE_SAMPLES = 6;",
+    "localparam int NOISE_SAMPLES = 8;",
 )
-SHORT_QUEUE = Change(
-    "a queue of 8",
-    "openecho_inflection.sv",
-    "localparam int QUEUE = 64;",
-    "localparam int QUEUE = 8;",
+NO_NOISE = Change(
+    "a window of 10 samples, more than a waveform has",
+    "openecho_pkg.sv",
+    "localparam int NOISE_SAMPLES = 50;",
+    "localparam int NOISE_SAMPLES = 10;",
 )
-DIVIDE_FAULTS = (
+FEW_EARLY = Change(
+    "a window of 14 samples",
+    "openecho_pkg.sv",
+    "localparam int NOISE_SAMPLES = 50;",
+    "localparam int NOISE_SAMPLES = 14;",
+)
+FEW_SLOTS = Change(
+    "no more slots than are needed",
+    "openecho_detect.sv",
+    "localparam int SLOTS = NEEDED_SLOTS > 16 ? 2 ** $clog2(NEEDED_SLOTS) : 16;",
+    "localparam int SLOTS = 2 ** $clog2(NEEDED_SLOTS);",
+)
+NARROW_AMPLITUDES = Change(
+    "amplitudes with 2 fraction bits",
+    "openecho_pkg.sv",
+    "localparam int AMP_FRAC = 8;",
+    "localparam int AMP_FRAC = 2;",
+)
+DETECT_FAULTS = (
     Change(
-        "an operation overwrites one that goes round",
-        "openecho_divide.sv",
-        "assign s_ready = advance && !again;",
-        "assign s_ready = advance;",
+        "the slot of a run that is kept is written on",
+        "openecho_detect.sv",
+        "slot_q <= slot_q + SLOT_W'(kept);",
+        "slot_q <= slot_q + SLOT_W'(component_q && kept);",
     ),
     Change(
-        "a round too few",
-        "openecho_divide.sv",
-        "loop_q == LOOP_W'(LOOPS - 1);",
-        "loop_q == LOOP_W'(LOOPS - 2);",
+        "a run of one beat is kept",
+        "openecho_detect.sv",
+        "single_q <= run_starts;",
+        "single_q <= 1'b0;",
     ),
     Change(
-        "a stall of the output is ignored",
-        "openecho_divide.sv",
-        "assign advance = !m_valid || m_ready;",
-        "assign advance = 1'b1;",
+        "the state stays from one waveform to the next",
+        "openecho_detect.sv",
+        "if (last_q) state_d = IDLE;",
+        "if (last_q && !full_q) state_d = IDLE;",
+    ),
+    Change(
+        "the peak of the run before stays",
+        "openecho_detect.sv",
+        "has_peak_q <= falls || (has_peak_q && !run_starts);",
+        "has_peak_q <= falls || has_peak_q;",
+    ),
+)
+DETECT_ROOM_FAULTS = (
+    Change(
+        "no room is kept for the beats on their way",
+        "openecho_detect.sv",
+        "room <= 32'(entries) < ENTRIES - BEATS &&",
+        "room <= 32'(entries) < ENTRIES &&",
+    ),
+)
+INTERPOLATE_FAULTS = (
+    Change(
+        "positions are cut, not rounded",
+        "openecho_interpolate.sv",
+        "{bin_q, peak_q != EVEN, FRAC'(1)}",
+        "{bin_q, peak_q != EVEN, FRAC'(0)}",
+    ),
+    Change(
+        "a quotient bit too few",
+        "openecho_interpolate.sv",
+        "step_q == STEP_W'(QUO_W + 3);",
+        "step_q == STEP_W'(QUO_W + 2);",
+    ),
+    Change(
+        "differences beyond the edge count",
+        "openecho_interpolate.sv",
+        "y_next_q <= s_edge ? '0 : s_y_next;",
+        "y_next_q <= s_y_next;",
     ),
 )
 ROWS = (
@@ -216,14 +268,14 @@ ROWS = (
             Change(
                 "echoes are numbered on through a waveform's end",
                 "openecho_output.sv",
-                "number_q   <= s_last ? '0 : number_q + 1'b1;",
-                "number_q   <= number_q + 1'b1;",
+                "if (rst || (accept && s_last)) number_q <= '0;",
+                "if (rst) number_q <= '0;",
             ),
             Change(
                 "a stalled beat counts in each cycle",
                 "openecho_output.sv",
-                "end else if (s_valid && s_ready) begin",
-                "end else if (s_valid) begin",
+                "assign accept = s_valid && s_ready;",
+                "assign accept = s_valid;",
             ),
         ),
     ),
@@ -244,26 +296,37 @@ ROWS = (
             "noise",
             "figures for each waveform once, in order, held; one division at a time, on sums that nothing touches",
             planted,
+            {"DSP": dsp},
             cover_depth=cover_depth,
             reduced=reduced,
         )
-        for window, cover_depth, planted, reduced in ((50, 80, (), ()), (6, 40, NOISE_FAULTS, (SHORT_NOISE,)))
+        for window, dsp, cover_depth, planted, reduced in (
+            ("50", 1, 90, (), ()),
+            ("50 without DSP", 0, 0, (), ()),
+            ("8", 1, 45, NOISE_FAULTS, (SHORT_NOISE,)),
+        )
     ),
     Row(
         "second_difference",
         "second_difference",
-        "each beat once, in order, with the exact differences of its own waveform",
+        "each beat once, in order, with the exact difference from the one before in its own waveform",
         (
             Change(
-                "the sum before is overwritten in a gap",
+                "the first difference before is overwritten in a gap",
                 "openecho_second_difference.sv",
-                "if (s_valid) sum_before_q <= FIRST_INT_W'(s_sum);",
-                "sum_before_q <= FIRST_INT_W'(s_sum);",
+                "if (advance && s_valid) begin",
+                "if (advance) begin",
+            ),
+            Change(
+                "differences go on from one waveform to the next",
+                "openecho_second_difference.sv",
+                "if (s_valid) fresh_q <= s_last;",
+                "if (s_valid) fresh_q <= 1'b0;",
             ),
             Change(
                 "a stall of the output is ignored",
                 "openecho_second_difference.sv",
-                "assign advance = !valid_q2 || m_ready;",
+                "assign advance = !valid_q || m_ready;",
                 "assign advance = 1'b1;",
             ),
         ),
@@ -271,13 +334,19 @@ ROWS = (
     Row(
         "filter",
         "filter",
-        "each beat once, in order, with its index and raw sample; a ready sink is never awaited",
+        "each beat once, in order, with index and raw sample; zeros before a waveform; a ready sink is never awaited",
         (
             Change(
                 "the history moves in a gap",
                 "openecho_filter.sv",
-                "if (s_valid) history_q <= {history_q[TAP_COUNT-1:0], s_sample};",
-                "history_q <= {history_q[TAP_COUNT-1:0], s_sample};",
+                "if (accept) history_q[0] <= s_sample;",
+                "if (advance) history_q[0] <= s_sample;",
+            ),
+            Change(
+                "the waveform before stays in the history",
+                "openecho_filter.sv",
+                "if (clear) history_q[TAP_COUNT:1] <= '0;",
+                "if (rst) history_q[TAP_COUNT:1] <= '0;",
             ),
             Change(
                 "a stall of the output is ignored",
@@ -289,114 +358,136 @@ ROWS = (
     ),
     *(
         Row(
-            f"divide in {stages} {'stage' if stages == 1 else 'stages'}",
-            "divide",
-            "each operation is one result, in order, after its rounds; bounded wait",
+            f"detect, {in_flight} in flight",
+            "detect",
+            proves,
             planted,
-            {"STAGES": stages},
+            {"IN_FLIGHT": in_flight, "CONTENTS": contents},
+            depth=1,
             cover_depth=cover_depth,
+            cover_parameters={"CONTENTS": 1},
+            reduced=(FEW_EARLY, FEW_SLOTS),
         )
-        for stages, cover_depth, planted in ((1, 0, ()), (2, 20, DIVIDE_FAULTS), (5, 0, ()))
+        for in_flight, contents, cover_depth, planted, proves in (
+            (0, 1, 24, DETECT_FAULTS, "queue and slots never overflow; each kept run and end once, in order, exact"),
+            (4, 0, 22, DETECT_ROOM_FAULTS, "queue and slots never overflow; no deadlock with the noise"),
+        )
     ),
     Row(
-        "divide, values",
-        "divide",
-        "quotients of 5 bits by 4 equal those of the operator /",
+        "threshold",
+        "threshold",
+        "armed after its cycles; kept exactly if at least min_amplitude and k deviations over the mean",
         (
             Change(
-                "a remainder of zero counts as negative",
-                "openecho_divide.sv",
-                "assign subtract = !remainder_in[DEN_W];",
-                "assign subtract = !remainder_in[DEN_W] && remainder_in != '0;",
+                "a bit of k too few",
+                "openecho_threshold.sv",
+                "bit_q <= STEP_W'(RATIO_W - 1);",
+                "bit_q <= STEP_W'(RATIO_W - 2);",
+            ),
+            Change(
+                "samples below the mean are kept",
+                "openecho_threshold.sv",
+                "assign kept = !negative_q && amplitude",
+                "assign kept = amplitude",
             ),
         ),
-        {"VALUES": 1},
-        mode="bmc",
-        depth=14,
+        depth=1,
         cover_depth=14,
+        reduced=(NARROW_AMPLITUDES,),
+    ),
+    *(
+        Row(
+            f"interpolate, {taps} taps",
+            "interpolate",
+            "one position for each operation, in time, equal to that of the operator /",
+            planted,
+            {"TAP_COUNT": taps},
+            depth=11,
+            cover_depth=24,
+        )
+        for taps, planted in ((4, INTERPOLATE_FAULTS), (5, ()))
     ),
     Row(
-        "inflection, queue",
         "inflection",
-        "the full-size queue never overflows, nothing that waits is overwritten, legal states, held output",
+        "inflection",
+        "each head is dropped or offered once, each end a trailer with its noise; held output; bounded wait",
         (
             Change(
-                "the end of a waveform does not wait for the one before",
+                "components that are kept are dropped too",
                 "openecho_inflection.sv",
-                "assign s_ready = queue_ready && !(s_last && (finish_waits_q || (waits && min_interval < 2)));",
-                "assign s_ready = queue_ready;",
+                "if (kept) state_d = LEFT;",
+                "if (kept && !head_flags[FLAG_NO_PEAK]) state_d = LEFT;",
+            ),
+            Change(
+                "noise is taken behind a component",
+                "openecho_inflection.sv",
+                "assign noise_ready = state_q == DONE && m_last;",
+                "assign noise_ready = state_q == DONE;",
             ),
             Change(
                 "a stall of the output is ignored",
                 "openecho_inflection.sv",
-                "assign m_free = !m_valid || m_ready;",
-                "assign m_free = 1'b1;",
+                "if (m_ready) state_d = DONE;",
+                "state_d = DONE;",
             ),
             Change(
-                "the state stays from one waveform to the next",
+                "nothing waits for the threshold",
                 "openecho_inflection.sv",
-                "if (s_last) state_d = IDLE;",
-                "if (s_last && !full) state_d = IDLE;",
+                "if (head_valid && armed) state_d = TEST;",
+                "if (head_valid) state_d = TEST;",
             ),
         ),
-        {"MAX_SAMPLES": 64},
-        cover_depth=12,
+        depth=1,
+        cover_depth=60,
+        cut=(
+            *(f"dut.head_{name}" for name in ("valid", "last", "maximum", "flags")),
+            *(f"dut.crossing_{name}" for name in ("edge", "bin", "y", "y_next")),
+            *("dut.m_length", "dut.kept", "dut.position"),
+        ),
     ),
     Row(
-        "inflection, contents",
-        "inflection",
-        "each kept run is one component, each waveform one trailer behind its components, in order; bounded wait",
+        "parameters",
+        "parameters",
+        "each component and each trailer once, in order, in time; centre, width and time exact",
         (
             Change(
-                "a queue of notes that is full takes more",
-                "openecho_inflection.sv",
-                "(QUEUE - QUEUE_MARGIN - 1);",
-                "(QUEUE - 1);",
+                "the width is cut, not rounded",
+                "openecho_parameters.sv",
+                "assign width = VALUE_W'(sum[POSITION_W-1:0]);",
+                "assign width = VALUE_W'(quotient_q[QUO_W-1:1]);",
             ),
             Change(
-                "a trailer is lost where a run still waits",
-                "openecho_inflection.sv",
-                "finish_waits_q <= (accept && s_last) || (finish_waits_q && right_waits_q);",
-                "finish_waits_q <= accept && s_last;",
+                "a component is taken while its record waits",
+                "openecho_parameters.sv",
+                "assign s_ready = state_q == IDLE ? s_last : state_q == SPAN && solved;",
+                "assign s_ready = state_q == IDLE || state_q == OFFER ? s_last : state_q == SPAN && solved;",
             ),
             Change(
-                "the maximum misses the last sample",
-                "openecho_inflection.sv",
-                ".s_data ({push_kind, push_index, maximum, push_flags}),",
-                ".s_data ({push_kind, push_index, maximum_q, push_flags}),",
+                "a stall of the output is ignored",
+                "openecho_parameters.sv",
+                "default: if (m_ready) state_d = IDLE;",
+                "default: state_d = IDLE;",
             ),
         ),
-        {"CONTENTS": 1, "QUEUE": 8},
-        mode="bmc",
         depth=22,
-        cover_depth=24,
-        reduced=(SHORT_QUEUE,),
+        cover_depth=28,
     ),
     Row(
-        "parameters",
-        "parameters",
-        "each kept component and each trailer once, in order, with its waveform's noise; queue and divider in step",
+        "core, gate",
+        "core",
+        "no beat comes later than the queue has room for after it has stopped the input",
         (
             Change(
-                "noise is taken in the middle of a waveform",
-                "openecho_parameters.sv",
-                "assign noise_ready = !armed_q && !arming_q;",
-                "assign noise_ready = !arming_q;",
-            ),
-            Change(
-                "components come in before the threshold is known",
-                "openecho_parameters.sv",
-                "assign s_ready = armed_q && solve_ready;",
-                "assign s_ready = solve_ready;",
-            ),
-            Change(
-                "fields are queued of what the divider does not take",
-                "openecho_solve.sv",
-                ".s_valid(a_valid_q && divide_ready),",
-                ".s_valid(a_valid_q),",
+                "the input does not stop",
+                "openecho_core.sv",
+                ".s_valid(s_valid && room),",
+                ".s_valid(s_valid),",
             ),
         ),
-        cover_depth=40,
+        {"GATE": 1},
+        depth=10,
+        cover_depth=14,
+        cut=("dut.room",),
     ),
     Row(
         "core",
@@ -411,11 +502,15 @@ ROWS = (
             ),
         ),
         mode="bmc",
-        depth=43,
-        cover_depth=50,
+        depth=26,
+        cover_depth=34,
         cover_parameters={"EASY": 1},
-        reduced=(SHORT_QUEUE,),
-        cut=("dut.first", "dut.second", "dut.noise_mean", "dut.noise_deviation"),
+        reduced=(NO_NOISE, FEW_SLOTS),
+        cut=(
+            *("dut.first", "dut.second", "dut.u_inflection.kept", "dut.u_inflection.armed"),
+            *(f"dut.u_inflection.{name}" for name in ("crossing_taken", "position_valid", "position")),
+            *("dut.u_parameters.solved", "dut.u_parameters.width_solved"),
+        ),
     ),
 )
 """All that is proved."""

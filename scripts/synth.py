@@ -82,7 +82,7 @@ class Build:
             numbers = {"EXP_W": form.exp_w, "FRAC_W": form.frac_w} | dict(self.built_as.parameters)
             return {name: str(number) for name, number in numbers.items()}
         values = hardware.parameters(self.built_as)
-        return {name: values[name] for name in MODULES[self.module].parameters}
+        return {name: values[name] for name in MODULES[self.module].parameters} | ({} if self.dsp else {"DSP": "0"})
 
 
 FLOATS = tuple(name for name in ARITHMETICS if name != "fixed")
@@ -236,7 +236,9 @@ def area(build: Build, versions: Mapping[str, str]) -> dict[str, float | None]:
     """What a build takes of an xc7."""
     top = MODULES[build.module].top
     commands = (
-        f"synth_xilinx -family xc7 -top {top} -flatten -noiopad{build.flags}; write_rtlil xc7.il; "
+        # The library's modules are left behind: read back with the netlist, they would hide those that have delays.
+        f"synth_xilinx -family xc7 -top {top} -flatten -noiopad{build.flags}; "
+        f"select {top}; write_rtlil -selected xc7.il; select -clear; "
         "tee -q -o area.json.partial stat -json -tech xilinx"
     )
     script = f"{read_command(build, top)}; {commands}"

@@ -84,6 +84,7 @@ def test_verilog_top_has_the_ports_and_defaults_of_the_shell() -> None:
     given = dict(re.findall(r"parameter (?:integer )?(?:\[383:0\] )?(\w+) = ([\w']+),", top))
     expected = parameters(Config())
     assert int(given.pop("TAPS").split("h")[1].replace("_", ""), 16) == int(expected.pop("TAPS").split("h")[1], 16)
+    assert given.pop("DSP") == "1"
     assert given == expected
 
 

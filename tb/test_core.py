@@ -15,6 +15,7 @@ from openecho.golden import ARITHMETICS, Config
 from openecho.study import comparison, precision
 from tb.env import runner
 from tb.env.run import Run
+from tb.env.waveforms import RARELY
 
 RECORDED = ("gedi_cerrado.npz", "lvis_arctic.npz", "neon_harvard.npz")
 SLICE = 50
@@ -50,7 +51,7 @@ def decomposed(
 
 
 @pytest.mark.parametrize("name", RECORDED)
-def test_core_equals_its_model_on_recorded_waveforms_without_a_bubble(
+def test_core_equals_its_model_on_recorded_waveforms_and_rarely_stalls(
     name: str, recorded: Path, tmp_path: Path
 ) -> None:
     config = Config()
@@ -59,7 +60,7 @@ def test_core_equals_its_model_on_recorded_waveforms_without_a_bubble(
     records, measured = decomposed(waveforms.samples[rows], waveforms.length[rows], config, tmp_path)
     assert measured["mismatches"] == 0
     assert measured["waveforms"] == records["trailer"].sum() == SLICE
-    assert measured["cycles_per_waveform"] == measured["samples_per_waveform"]
+    assert measured["cycles_per_waveform"] <= (1 + RARELY) * measured["samples_per_waveform"]
 
 
 def test_core_agrees_with_float64_on_the_reference_waveforms(tmp_path: Path) -> None:

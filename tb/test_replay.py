@@ -15,6 +15,7 @@ from openecho.decompose import EngineError, decompose
 from openecho.golden import ARITHMETICS, Config
 from openecho.hardware import ROOT
 from tb.env import runner
+from tb.env.waveforms import RARELY
 from tb.replay import bench
 
 RECORDED = ("gedi_cerrado.npz", "lvis_arctic.npz", "neon_harvard.npz")
@@ -156,7 +157,7 @@ def test_recorded_waveforms_give_the_records_of_the_golden_model(name: str, reco
     replayed = bench.replay(samples, length, config)
     assert np.count_nonzero(replayed.records[:, 0] >> 31) == SLICE
     assert bench.compare(replayed.records, samples, length, config) == bench.Comparison(0, ())
-    assert replayed.stalls == 0
+    assert replayed.stalls <= RARELY * length.sum()
 
 
 @pytest.mark.parametrize(

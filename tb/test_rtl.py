@@ -76,10 +76,21 @@ def cases() -> Iterator[object]:
 
 def benches(module: str, config: Config) -> list[str]:
     """Python modules with the tests of an RTL module."""
+    return ["tb.env.tests", *rates(module, config), f"tb.modules.{module}"]
+
+
+def rates(module: str, config: Config) -> list[str]:
+    """Python modules with the tests of what an RTL module takes without a stall.
+
+    Echoes wait in a queue to be interpolated, which takes no endless train of them; in floating point, where more of it
+    is kept free for what is on its way, only as many at once as come in recorded data.
+    """
     row = MODULES[module]
-    # In floating point, interpolation is shared by so many components only as come without a pause in recorded data.
-    sustained = row.takes_samples and (config.form is None or "min_interval" not in row.settings)
-    return ["tb.env.tests", *["tb.env.throughput"] * sustained, f"tb.modules.{module}"]
+    if not row.takes_samples:
+        return []
+    if "min_interval" not in row.settings:
+        return ["tb.env.throughput"]
+    return ["tb.env.pruning", *["tb.env.bursts"] * (config.form is None)]
 
 
 def need(simulator: str) -> None:

@@ -81,7 +81,8 @@ class Module:
         verified inside the modules that use it.
     latency : dict of str to callable
         For an output's prefix, the cycles from the transfer of the beat that determines an output beat to the transfer
-        of that beat, in an idle module whose sink is ready: a function of the `Config`, or of the `FloatUnit`.
+        of that beat, in an idle module whose sink is ready: a function of the `Config`, or of the `FloatUnit`. Where an
+        echo takes longer than a trailer, by what its interpolations and divisions take, that of a trailer.
     budget : Area or None
         What it may take: what it took when this was last looked at, so that a change that makes it grow is noticed.
     """
@@ -141,9 +142,9 @@ class FloatUnit:
 
 
 _SAMPLES = ("sample", "index", "overlong")
-_SUMS = ("sum", "raw", "index", "overlong")
-_DIFFERENCES = ("second", "first", "raw", "index", "overlong")
-_COMPONENTS = ("left", "right", "peak", "maximum", "length", "flags")
+_BESIDE = ("raw", "index", "overlong")
+_DIFFERENCES = ("second", "first", "raw", "overlong")
+_COMPONENTS = ("left", "right", "peak", "amplitude", "length", "mean", "flags")
 _ECHOES = ("centre", "peak", "width", "time", "amplitude", "flags")
 _NOISE = Stream("noise", ("mean", "deviation", "none"), last=False)
 _RECORDS = Stream("m", ("record",), words=8)
@@ -154,27 +155,17 @@ _ALL = ("SAMPLE_W", "EXP_W", "FRAC", "MAX_SAMPLES", "TAP_COUNT", "TAPS")
 
 
 def _second_difference_latency(config: Config) -> int:
-    """Cycles of `second_difference`: 2, and those of a conversion in floating point."""
+    """Cycles of `second_difference`: 1, and those of a conversion in floating point."""
     if config.form is None:
-        return 2
-    built = FloatUnit(config.form, {"INT_W": config.difference_w, "SCALE": -TAP_FRAC})
-    return 2 + _from_int_latency(built)
-
-
-def _parameters_latency(config: Config) -> int:
-    """Cycles of `parameters`, fixed point: 8, and the rows of its divider, whose ring each quotient passes six times.
-
-    Floating point: 1, of a trailer; an echo takes longer by what its operations take.
-    """
-    if config.form is not None:
         return 1
-    return 8 + 6 * math.ceil((config.pos_w + 1) / 6)
+    built = FloatUnit(config.form, {"INT_W": config.difference_w, "SCALE": -TAP_FRAC})
+    return 1 + _from_int_latency(built)
 
 
 def _core_latency(config: Config) -> int:
-    """Cycles from reader to parameters, which in floating point looks at a beat for one before it takes it."""
-    waits = config.form is not None
-    return 1 + 4 + _second_difference_latency(config) + 3 + waits + _parameters_latency(config)
+    """Cycles of the core's modules in a row; those of `output` are none."""
+    names = ("reader", "filter", "second_difference", "inflection", "parameters")
+    return sum((MODULES[name].latency or {})["m"](config) for name in names)
 
 
 def _levels(width: int) -> int:
@@ -224,45 +215,45 @@ MODULES: dict[str, Module] = {
             outputs=(Stream("m", _SAMPLES), _NOISE),
             golden=golden.reader,
             latency={"m": lambda _: 1},
-            budget=Area(lut=210, ff=219, dsp=1),
+            budget=Area(lut=150, ff=242, dsp=2),
         ),
         Module(
             name="filter",
             parameters=_FILTER,
             inputs=(Stream("s", _SAMPLES),),
-            outputs=(Stream("m", _SUMS),),
+            outputs=(Stream("m", ("sum", "first", *_BESIDE)),),
             golden=golden.filter,
-            latency={"m": lambda _: 4},
-            budget=Area(lut=365, ff=455),
+            latency={"m": lambda _: 5},
+            budget=Area(lut=268, ff=544),
         ),
         Module(
             name="second_difference",
             parameters=_ALL,
-            inputs=(Stream("s", _SUMS),),
-            outputs=(Stream("m", _DIFFERENCES),),
+            inputs=(Stream("s", ("first", *_BESIDE)),),
+            outputs=(Stream("m", (*_DIFFERENCES, "index")),),
             golden=golden.second_difference,
             latency={"m": _second_difference_latency},
-            budget=Area(lut=54, ff=150),
+            budget=Area(lut=22, ff=66),
         ),
         Module(
             name="inflection",
             parameters=_ALL,
-            inputs=(Stream("s", _DIFFERENCES),),
+            inputs=(Stream("s", _DIFFERENCES), _NOISE),
             outputs=(Stream("m", _COMPONENTS),),
-            settings=("min_interval",),
+            settings=("min_interval", "min_amplitude", "k"),
             golden=golden.inflection,
-            latency={"m": lambda _: 3},
-            budget=Area(lut=661, ff=799),
+            latency={"m": lambda _: 5},
+            budget=Area(lut=446, ff=464),
         ),
         Module(
             name="parameters",
             parameters=_POSITIONS,
-            inputs=(Stream("s", _COMPONENTS), _NOISE),
+            inputs=(Stream("s", _COMPONENTS),),
             outputs=(Stream("m", _ECHOES),),
-            settings=("n", "min_amplitude", "k"),
+            settings=("n",),
             golden=golden.parameters,
-            latency={"m": _parameters_latency},
-            budget=Area(lut=622, ff=561),
+            latency={"m": lambda _: 1},
+            budget=Area(lut=160, ff=186),
         ),
         Module(
             name="output",
@@ -271,7 +262,7 @@ MODULES: dict[str, Module] = {
             outputs=(_RECORDS,),
             golden=golden.output,
             latency={"m": lambda _: 0},
-            budget=Area(lut=19, ff=48),
+            budget=Area(lut=5, ff=48),
         ),
         Module(
             name="core",
@@ -281,7 +272,7 @@ MODULES: dict[str, Module] = {
             settings=("n", "min_interval", "min_amplitude", "k"),
             golden=golden.core,
             latency={"m": _core_latency},
-            budget=Area(lut=1901, ff=2228, dsp=1),
+            budget=Area(lut=995, ff=1499, dsp=2),
         ),
         # The core on AXI buses, verified by tb/axi
         Module(name="axi", parameters=_ALL),
@@ -289,10 +280,11 @@ MODULES: dict[str, Module] = {
         Module(name="axi_lite"),
         Module(name="check", parameters=("SAMPLE_W", "EXP_W", "FRAC", "MAX_SAMPLES", "TAP_COUNT")),
         Module(name="interpolate", parameters=("EXP_W", "FRAC", "MAX_SAMPLES")),
-        Module(name="solve", parameters=_POSITIONS),
+        Module(name="detect", parameters=_ALL),
+        Module(name="threshold", parameters=("SAMPLE_W",)),
         Module(name="noise", parameters=("SAMPLE_W", "MAX_SAMPLES")),
-        Module(name="divide"),
         Module(name="fifo"),
+        Module(name="multiply"),
         Module(name="square_root"),
         # IEEE-754 units, verified by tb/float, and their parts
         Module(name="float_add", parameters=_FLOAT, latency={"m": _add_latency}),

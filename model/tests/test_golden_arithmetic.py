@@ -8,7 +8,7 @@ import pytest
 
 from openecho.golden import arithmetic
 from openecho.golden.floating import BFLOAT16, BINARY16, BINARY32, BINARY64, Format
-from openecho.golden.parameters import TIME_DIVISOR
+from openecho.golden.parameters import TIME_DIVISOR, time_divisor
 
 DTYPES = {BINARY16: np.float16, BINARY32: np.float32, BINARY64: np.float64}
 ODD = Format(6, 17)
@@ -126,8 +126,17 @@ def test_underflow_is_ordinary() -> None:
 
 @pytest.mark.parametrize("form", FORMATS, ids=str)
 def test_the_divisor_of_the_echo_time_is_the_nearest_number(form: Format) -> None:
+    nearest = Fraction(arithmetic.decode(arithmetic.constant(TIME_DIVISOR, form), form).item())
+    assert_nearest_divisor(nearest, form.frac_w)
+
+
+@pytest.mark.parametrize("frac", [11, 28, 40])
+def test_the_divisor_of_the_echo_time_is_the_nearest_in_fixed_point(frac: int) -> None:
+    assert_nearest_divisor(Fraction(time_divisor(frac), 1 << frac), frac)
+
+
+def assert_nearest_divisor(found: Fraction, frac: int) -> None:
     # K² = 2/ln 2, and ln 2 = Σ 1/(k·2^k): the square lies between those of the middles to the neighbours.
     squared = 2 / sum(Fraction(1, k << k) for k in range(1, 200))
-    nearest = Fraction(arithmetic.decode(arithmetic.constant(TIME_DIVISOR, form), form).item())
-    half_place = Fraction(1, 2 << form.frac_w)
-    assert (nearest - half_place) ** 2 < squared < (nearest + half_place) ** 2
+    half_place = Fraction(1, 2 << frac)
+    assert (found - half_place) ** 2 < squared < (found + half_place) ** 2

@@ -1,6 +1,9 @@
 """Each golden module by a second way of computing it, with numpy."""
 
+import dataclasses
 import itertools
+import math
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -113,20 +116,24 @@ def test_second_difference_is_the_merged_22_tap_filter() -> None:
         np.testing.assert_array_equal(second, np.convolve(row[:n], MERGED)[:n])
 
 
-def worked_example() -> tuple[golden.Beats, golden.Config]:
+def worked_example(raw: int = 0) -> tuple[golden.Beats, golden.Config]:
     """Second differences of the paper's Figure 3, times 10⁷; five taps put the difference at beat i on bin i − 3."""
-    config = golden.Config(taps=(1, 2, 3, 2, 1), sample_w=16, frac=24)
+    config = golden.Config(taps=(1, 2, 3, 2, 1), sample_w=16, frac=24, min_amplitude=0, k=0.0)
     index = np.arange(600)
     second = np.where((index < 540) | (index > 573), 1_000_000, -1_000_000)
     second[[539, 540, 573, 574]] = 1464000, -5684, -563300, 566400
     zero = np.zeros_like(index)
-    beats = {"second": second, "first": zero, "raw": zero, "index": index, "overlong": zero, "last": index == 599}
+    beats = {"second": second, "first": zero, "raw": zero + raw, "index": index, "overlong": zero, "last": index == 599}
     return beats, config
+
+
+def one_noise(mean: int, deviation: int, none: int = 0) -> golden.Beats:
+    return {"mean": np.array([mean]), "deviation": np.array([deviation]), "none": np.array([none])}
 
 
 def test_worked_example_of_the_paper_through_inflection() -> None:
     beats, config = worked_example()
-    found = golden.inflection(beats, config)
+    found = golden.inflection(beats, one_noise(0, 0), config)
     assert found["last"].tolist() == [False, True]
     assert found["cause"].tolist() == [574, 599]
     bins = [found[name][0] / 2**24 for name in ("left", "right")]
@@ -135,25 +142,39 @@ def test_worked_example_of_the_paper_through_inflection() -> None:
     np.testing.assert_allclose(bins, [536 + 1464000 / 1469684, 570 + 563300 / 1129700], rtol=0, atol=2**-25)
 
 
-def test_parameters_drop_what_does_not_rise_out_of_the_noise() -> None:
-    config = golden.Config(min_amplitude=5, k=3.0)
-    last = np.array([False, False, True, False, False, True])
-    zero = np.zeros(6, np.int64)
-    beats = {"left": zero, "right": zero + (8 << 16), "peak": zero, "length": zero, "flags": zero, "last": last}
-    beats["maximum"] = np.array([104, 105, 0, 119, 120, 0])
-    noise = {"mean": np.array([100, 90]) << 8, "deviation": np.array([1, 10]) << 8, "none": np.array([0, 0])}
-    kept = golden.parameters(beats, noise, config)
-    assert kept["cause"].tolist() == [1, 2, 4, 5]
-    assert kept["amplitude"].tolist() == [5 << 8, 1 << 8, 30 << 8, 10 << 8]
+@pytest.mark.parametrize(
+    ("min_amplitude", "k", "deviation"),
+    [(5, 3.0, 100), (5, 0.0, 65535), (0, 0.0, 9), (0, 15.9375, 1600), (7, 0.0625, 28672), (9, 1.5, 1537)],
+)
+def test_inflection_drops_what_does_not_rise_out_of_the_noise(min_amplitude: int, k: float, deviation: int) -> None:
+    raw, threshold = 20_000, max(Fraction(min_amplitude), Fraction(k) * Fraction(deviation, 256))
+    beats, config = worked_example(raw)
+    config = dataclasses.replace(config, min_amplitude=min_amplitude, k=k)
+    edge = raw * 256 - math.ceil(threshold * 256)
+    for mean in (edge - 1, edge, edge + 1):
+        found = golden.inflection(beats, one_noise(mean, deviation), config)
+        risen = raw - Fraction(mean, 256) >= threshold
+        assert risen == (mean <= edge)
+        assert found["amplitude"].tolist() == [raw * 256 - mean] * risen + [deviation]
+        assert found["mean"].tolist() == [None] * risen + [mean]
+
+
+def test_inflection_takes_each_waveforms_own_noise_and_flags_where_there_is_none() -> None:
+    beats, config = worked_example(raw=100)
+    beats = {name: np.tile(values, 3) for name, values in beats.items()}
+    noise = {"mean": np.array([0, 101, 99]) << 8, "deviation": np.array([0, 7, 8]), "none": np.array([1, 0, 0])}
+    found = golden.inflection(beats, noise, config)
+    assert found["last"].tolist() == [False, True, True, False, True]
+    assert found["amplitude"].tolist() == [100 << 8, 0, 7, 1 << 8, 8]
+    assert found["flags"][found["last"]].tolist() == [golden.NO_NOISE, 0, 0]
 
 
 @pytest.mark.parametrize(("n", "width"), [(2.0, 4.0), (1.0, 8.0), (0.0, 8.0), (15.9375, 8 / 15.9375)])
 def test_width_is_the_interval_over_n_and_n_below_one_counts_as_one(n: float, width: float) -> None:
     config = golden.Config(n=n)
-    one = np.ones(1, np.int64)
-    beats = {"left": 9 << 16, "right": 17 << 16, "peak": 0, "length": 0, "flags": 0, "maximum": 50}
-    noise = {"mean": one, "deviation": one, "none": one}
-    found = golden.parameters({name: value * one for name, value in beats.items()} | {"last": one == 0}, noise, config)
+    beats = {"left": 9 << 16, "right": 17 << 16, "peak": 0, "amplitude": 50 << 8, "length": 0, "mean": 0, "flags": 0}
+    fields = {name: np.array([value]) for name, value in beats.items()}
+    found = golden.parameters(fields | {"last": np.array([False])}, config)
     assert abs(found["width"][0] / 2**16 - width) <= 2**-17
 
 
@@ -200,8 +221,8 @@ def test_core_is_the_six_modules_and_its_causes_are_samples() -> None:
     rows, length = noisy(seed=9)
     beats = golden.stream(rows, length, config)
     samples, noise = golden.reader(beats, config)
-    components = golden.inflection(golden.second_difference(golden.filter(samples, config), config), config)
-    expected = golden.output(golden.parameters(components, noise, config), config)
+    components = golden.inflection(golden.second_difference(golden.filter(samples, config), config), noise, config)
+    expected = golden.output(golden.parameters(components, config), config)
     found = golden.core(beats, config)
     np.testing.assert_array_equal(found["record"], expected["record"])
     np.testing.assert_array_equal(found["last"], expected["last"])

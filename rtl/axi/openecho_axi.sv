@@ -32,6 +32,7 @@ module openecho_axi
     parameter int MAX_SAMPLES = 4096,
     parameter int TAP_COUNT = PAPER_TAP_COUNT,
     parameter logic [TAPS_W-1:0] TAPS = PAPER_TAPS,
+    parameter bit DSP = 1'b1,
     // Follows from the others; a parameter because openecho_axi_top, in plain Verilog, has to be told.
     parameter int WORD_W = record_word_width(SAMPLE_W, EXP_W, FRAC, MAX_SAMPLES)
 ) (
@@ -126,7 +127,8 @@ module openecho_axi
       .FRAC(FRAC),
       .MAX_SAMPLES(MAX_SAMPLES),
       .TAP_COUNT(TAP_COUNT),
-      .TAPS(TAPS)
+      .TAPS(TAPS),
+      .DSP(DSP)
   ) u_core (
       .clk(aclk),
       .rst(!aresetn || clear_q),

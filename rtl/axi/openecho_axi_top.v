@@ -10,6 +10,7 @@ module openecho_axi_top #(
     parameter integer MAX_SAMPLES = 4096,
     parameter integer TAP_COUNT = 20,
     parameter [383:0] TAPS = 384'h0096_0092_008a_007f_0072_0063_0054_0045_0037_002b,
+    parameter integer DSP = 1,
     parameter integer WORD_W = (EXP_W > 0 ? 1 + EXP_W + FRAC <= 32 : MAX_SAMPLES <= (1 << (31 - FRAC))) ? 32 : 64
 ) (
     (* X_INTERFACE_INFO = "xilinx.com:signal:clock:1.0 aclk CLK" *)
@@ -82,6 +83,7 @@ module openecho_axi_top #(
       .MAX_SAMPLES(MAX_SAMPLES),
       .TAP_COUNT(TAP_COUNT),
       .TAPS(TAPS),
+      .DSP(DSP != 0),
       .WORD_W(WORD_W)
   ) u_axi (
       .aclk(aclk),

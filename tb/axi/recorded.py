@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tb.axi.shell import Shell, counts, equal, expected, shell_test, waveforms_of
+from tb.env.waveforms import RARELY
 
 
 @shell_test
@@ -18,4 +19,5 @@ async def waveforms_of_a_file_pass_back_to_back_and_with_pauses(shell: Shell) ->
         shell.send(waveforms)
         equal(await shell.take(len(waveforms)), wanted)
         await shell.expect(**counts(wanted), STALLS=shell.samples_in.stalls, ERROR_CAUSE=0)
-        assert paused or shell.samples_in.stalls == 0
+        samples = sum(len(waveform) for waveform in waveforms)
+        assert paused or shell.samples_in.stalls <= RARELY * samples

@@ -116,6 +116,11 @@ class ModuleTest(uvm_test):
             fastest = self.bench.scoreboard.latency[prefix].min()
             assert fastest == stated(self.config), f"{prefix}: latency {fastest}, expected {stated(self.config)} cycles"
 
+    def check_rate(self) -> None:
+        """Fail if the first input waited in the last run, which must have been without pauses."""
+        stalls = self.bench.scoreboard.source.stalls
+        assert stalls == 0, f"the input waited {stalls} cycles, expected none"
+
     async def play(
         self,
         title: str,

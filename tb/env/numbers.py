@@ -13,6 +13,12 @@ FRAC_FLOAT = 8
 """Fractional bits in which a test states the positions that it sends to a floating-point core."""
 
 
+def any_value(greatest: int, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Random integers from 0 to the greatest that there is; one in five of them is at an end, or next to it."""
+    anything = rng.integers(0, greatest, count, endpoint=True)
+    return np.where(rng.random(count) < 0.2, rng.choice([0, 1, greatest - 1, greatest], count), anything)
+
+
 def encoded(values: NDArray[np.int64], frac: int, config: Config) -> NDArray[np.int64]:
     """Integers times 2^-frac as floats of the configuration; in fixed point, the integers themselves."""
     return values if config.form is None else arithmetic.from_int(values, config.form, -frac)

@@ -10,7 +10,8 @@ module noise_formal
   import openecho_pkg::*;
 #(
     parameter int SAMPLE_W = 8,
-    parameter int MAX_SAMPLES = 64
+    parameter int MAX_SAMPLES = 64,
+    parameter bit DSP = 1'b1
 ) (
     input logic                clk,
     input logic                rst,
@@ -22,6 +23,7 @@ module noise_formal
 );
   localparam int AMP_W = SAMPLE_W + AMP_FRAC;
   localparam int TOKENS = 16;
+  localparam int PIPELINE = 4 + (DSP ? 2 : SAMPLE_W / 2 + 1);  // cycles from a window's last sample until D is held
 
   logic started, s_ready, m_valid, m_none;
   logic [AMP_W-1:0] m_mean, m_deviation;
@@ -29,7 +31,8 @@ module noise_formal
 
   openecho_noise #(
       .SAMPLE_W(SAMPLE_W),
-      .MAX_SAMPLES(MAX_SAMPLES)
+      .MAX_SAMPLES(MAX_SAMPLES),
+      .DSP(DSP)
   ) dut (
       .clk,
       .rst,
@@ -90,18 +93,23 @@ module noise_formal
       .content
   );
 
+  logic [PIPELINE-1:0] completing;  // the last sample of a window on its way
+  assign completing = {dut.u_spread.last_q, dut.complete_q};
+
   // A token a cycle is taken, until one comes whose sums are still on their way or being divided.
   int to_go;
   always_comb begin
     to_go = count;
-    if (dut.running) to_go = count + 32'(dut.step_q);
-    else if (dut.held_q) to_go = count + dut.ROOT_W + 1;
+    if (dut.fetch) to_go = count + 32'(dut.step_q) + 3;
+    else if (dut.fetched_q[0]) to_go = count + 2;
+    else if (dut.fetched_q[1]) to_go = count + 1;
+    else if (dut.held_q) to_go = count + dut.ROOT_W + 3;
     else begin
-      for (int i = 0; i < 4; i++) if (dut.complete_q[i]) to_go = count + dut.ROOT_W + 1 + 4 - i;
+      for (int i = 0; i < PIPELINE; i++) if (completing[i]) to_go = count + dut.ROOT_W + 3 + PIPELINE - i;
     end
   end
   progress_formal #(
-      .LIMIT(TOKENS + SAMPLE_W + 14)
+      .LIMIT(TOKENS + SAMPLE_W + 12 + PIPELINE)
   ) u_progress (
       .clk,
       .rst,
@@ -115,8 +123,8 @@ module noise_formal
   logic windows_apart;  // the next window ends long after the sums of this one have gone through the pipeline
   always_comb begin
     windows_apart = 1'b1;
-    for (int i = 0; i < 4; i++) begin
-      if (dut.complete_q[i] && position_q > i && position_q < NOISE_SAMPLES) windows_apart = 1'b0;
+    for (int i = 0; i < PIPELINE; i++) begin
+      if (completing[i] && position_q > i && position_q < NOISE_SAMPLES) windows_apart = 1'b0;
     end
     with_figures = 0;
     for (int i = 0; i < TOKENS; i++) begin
@@ -129,17 +137,24 @@ module noise_formal
     a_waveform_ends_in_time : assume (position_q != MAX_SAMPLES - 1 || s_last);
     if (started) begin
       position_in_range : assert (position_q >= 0 && position_q < MAX_SAMPLES);
+      window_is_known : assert (dut.in_window_q == (position_q < NOISE_SAMPLES));
+      limit_is_known : assert (dut.at_limit_q == (position_q == NOISE_SAMPLES - 1));
       a_token_a_waveform : assert (32'(dut.u_tokens.level) == count);
       marked_is_in_its_place :
       assert (!marked || dut.u_tokens.memory[($clog2(TOKENS))'(32'(dut.u_tokens.read_q)+ahead)] == content);
-      sums_of_one_waveform_in_work : assert (!(dut.held_q && dut.complete_q != '0));
+      sums_of_one_waveform_in_work : assert (!(dut.held_q && completing != '0));
       windows_far_apart : assert (windows_apart);
-      one_window_in_the_pipeline : assert ((dut.complete_q & (dut.complete_q - 1'b1)) == '0);
-      figures_accounted_for : assert (with_figures == $countones(dut.complete_q) + 32'(dut.held_q) + 32'(dut.done));
-      divides_what_is_held : assert (!dut.running || dut.held_q);
+      one_window_in_the_pipeline : assert ((completing & (completing - 1'b1)) == '0);
+      figures_accounted_for :
+      assert (with_figures == $countones(completing) + 32'(dut.held_q) + 32'(dut.busy_q && !dut.fetch));
+      divides_what_is_held : assert (!dut.fetch || dut.held_q);
       divides_for_the_oldest : assert (!dut.busy_q || (dut.token_valid && !dut.token_none));
-      steps_in_range : assert (!dut.busy_q || 32'(dut.step_q) <= dut.ROOT_W);
-      idle_is_ready_to_start : assert (!dut.token_valid || dut.busy_q || 32'(dut.step_q) == dut.ROOT_W);
+      fetched_is_in_work : assert (dut.fetched_q == '0 || dut.busy_q);
+      divided_before_the_next_is_held :
+      assert (dut.fetch || dut.fetched_q == '0
+              || (!dut.held_q && (completing == '0 || (!dut.fetched_q[0] && completing == 1))));
+      steps_in_range : assert (!dut.fetch || 32'(dut.step_q) < dut.ROOT_W);
+      idle_is_ready_to_start : assert (!dut.token_valid || dut.busy_q || 32'(dut.step_q) == dut.ROOT_W - 1);
       idle_is_zero :
       assert (!dut.token_valid || dut.busy_q
               || {dut.mean_q, dut.mean_rest_q, dut.deviation_q, dut.deviation_rest_q} == '0);

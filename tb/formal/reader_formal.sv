@@ -131,6 +131,8 @@ module reader_formal
       skips_what_is_cut : assert (dut.skipping_q == (position_q == MAX_SAMPLES));
       index_counts_samples : assert (32'(dut.index_q) == (dut.skipping_q ? 0 : position_q));
       position_in_range : assert (position_q >= 0 && position_q <= MAX_SAMPLES);
+      window_is_known : assert (dut.u_noise.in_window_q == (32'(dut.index_q) < NOISE_SAMPLES));
+      limit_is_known : assert (dut.u_noise.at_limit_q == (32'(dut.index_q) == NOISE_SAMPLES - 1));
       output_is_what_is_inside : assert (m_valid == (count != 0));
       one_figure_a_waveform : assert (32'(dut.u_noise.u_tokens.level) == figures_q);
       figures_in_range : assert (figures_q >= 0 && figures_q <= TOKENS);

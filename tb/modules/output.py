@@ -13,8 +13,7 @@ from tb.modules import parameters
 
 def inputs(beats: Beats, config: Config) -> dict[str, Beats]:
     """Beats on each input for these waveforms."""
-    before = parameters.inputs(beats, config)
-    return {"s": golden.parameters(before["s"], before["noise"], config)}
+    return {"s": golden.parameters(parameters.inputs(beats, config)["s"], config)}
 
 
 @pyuvm.test()

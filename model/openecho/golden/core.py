@@ -25,7 +25,7 @@ def core(beats: Beats, config: Config) -> Beats:
         `record`, as `output` returns it.
     """
     samples, noise = reader(beats, config)
-    components = inflection(second_difference(filter(samples, config), config), config)
-    echoes = parameters(components, noise, config)
+    components = inflection(second_difference(filter(samples, config), config), noise, config)
+    echoes = parameters(components, config)
     records = output(echoes, config)
     return records | {"cause": samples["cause"][components["cause"][echoes["cause"]]]}

@@ -20,14 +20,17 @@ def filter(beats: Beats, config: Config) -> Beats:
     Returns
     -------
     Beats
-        `sum`; `raw`, the sample `config.delay` beats ago, undefined in the beats before that; `index`, `overlong`.
+        `sum`; `first`, what it is more than the sum before; `raw`, the sample `config.delay` beats ago, undefined in
+        the beats before that; `index`, `overlong`.
     """
     sample, last = beats["sample"], beats["last"]
-    slot = np.arange(sample.size) + (config.tap_count - 1) * waveform_of(last)
+    slot = np.arange(sample.size) + config.tap_count * waveform_of(last)
     padded = np.zeros(slot[-1] + 1, np.int64)
     padded[slot] = sample
+    filtered = np.convolve(padded, config.taps)
     return {
-        "sum": np.convolve(padded, config.taps)[slot],
+        "sum": filtered[slot],
+        "first": np.diff(filtered, prepend=0)[slot],
         "raw": np.ma.MaskedArray(np.roll(sample, config.delay), mask=beats["index"] < config.delay),
         "index": beats["index"],
         "overlong": beats["overlong"],

@@ -3,12 +3,12 @@
 import numpy as np
 
 from .arithmetic import from_int
-from .beats import Beats, IntArray
+from .beats import Beats
 from .config import TAP_FRAC, Config
 
 
 def second_difference(beats: Beats, config: Config) -> Beats:
-    """First and second backward difference of the filtered waveform, taken as 0 before its start.
+    """Second backward difference of the filtered waveform, taken as 0 before its start, beside the first.
 
     Zhou 2022, Eq (2), with its newest sample y[x+2] as the current one. In fixed point both are exact and, as the sum,
     without the 2⁻¹¹ of Eq (11). As floats they have it, so that they stay in the range of binary16: integers,
@@ -17,7 +17,7 @@ def second_difference(beats: Beats, config: Config) -> Beats:
     Parameters
     ----------
     beats : Beats
-        `sum`, `raw`, `index`, `overlong`, `last`.
+        `first`, `raw`, `index`, `overlong`, `last`.
     config : Config
 
     Returns
@@ -25,9 +25,10 @@ def second_difference(beats: Beats, config: Config) -> Beats:
     Beats
         `second`, `first`, and `raw`, `index`, `overlong` as they came.
     """
-    starts = np.flatnonzero(beats["index"] == 0)
-    first = _difference(beats["sum"], starts)
-    second = _difference(first, starts)
+    first = beats["first"]
+    second = np.diff(first, prepend=0)
+    starts = beats["index"] == 0
+    second[starts] = first[starts]
     return {
         "second": second if config.form is None else from_int(second, config.form, -TAP_FRAC),
         "first": first if config.form is None else from_int(first, config.form, -TAP_FRAC),
@@ -37,10 +38,3 @@ def second_difference(beats: Beats, config: Config) -> Beats:
         "last": beats["last"],
         "cause": np.arange(first.size),
     }
-
-
-def _difference(values: IntArray, starts: IntArray) -> IntArray:
-    """Each value less the one before it in its waveform; the first of a waveform stays."""
-    result = np.diff(values, prepend=0)
-    result[starts] = values[starts]
-    return result
