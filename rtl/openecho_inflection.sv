@@ -4,9 +4,9 @@
 // The trailer of a waveform (m_last) carries its length, its noise mean and, as amplitude, its noise deviation. A
 // component without a peak has FLAG_NO_PEAK and m_peak undefined.
 //
-// One interpolation at a time: an echo takes 3 of them, 66 cycles in fixed point at FRAC 16, a component that is dropped 3
-// cycles. The input is taken at one beat a clock, while the queue of openecho_detect takes up what comes faster: 16
-// components. When it is full, s_ready falls.
+// In fixed point one interpolation at a time: an echo takes 3 of them and 6 cycles more, 72 at FRAC 16, a component that
+// is dropped 3 cycles. The input is taken at one beat a clock, while the queue of openecho_detect takes up what comes
+// faster. When what is left of it is just enough for the beats on their way, s_ready falls.
 //
 // s_ready comes from a register, and a source that goes on sending for IN_FLIGHT beats after it falls may do so if
 // IN_FLIGHT is above 0: each of its beats is taken. So a whole pipeline before this module can do without stalls.

@@ -136,9 +136,9 @@ module openecho_parameters
 
     logic [ STEP_W-1:0] step_q;  // of a division: those to come
     logic [RATIO_W-1:0] divisor_q;
-    logic [ADDER_W-1:0]
-        remainder_q, a, b, sum;  // the first of a division is its numerator; that after TIME is the time
-    logic [QUO_W-1:0] quotient_q;
+    logic [ADDER_W-1:0] a, b, sum;
+    logic [ADDER_W-1:0] remainder_q;  // the first of a division is its numerator; that after TIME is the time
+    logic [  QUO_W-1:0] quotient_q;
     logic positions, dividing, subtract_q, carry, unused_carry;
 
     assign positions = state_q[3];

@@ -279,7 +279,7 @@ MODULES: dict[str, Module] = {
         Module(name="axi_top", parameters=_ALL),
         Module(name="axi_lite"),
         Module(name="check", parameters=("SAMPLE_W", "EXP_W", "FRAC", "MAX_SAMPLES", "TAP_COUNT")),
-        Module(name="interpolate", parameters=("EXP_W", "FRAC", "MAX_SAMPLES")),
+        Module(name="interpolate", parameters=("EXP_W", "FRAC", "MAX_SAMPLES", "TAP_COUNT")),
         Module(name="detect", parameters=_ALL),
         Module(name="threshold", parameters=("SAMPLE_W",)),
         Module(name="noise", parameters=("SAMPLE_W", "MAX_SAMPLES")),
