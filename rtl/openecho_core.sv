@@ -1,7 +1,7 @@
 // Samples in, echoes out: reader, filter, second_difference, inflection, parameters and output in a row.
 //
-// One sample a clock, waveforms back to back, with the sink always ready. An echo takes 72 cycles in fixed point at FRAC 16
-// (openecho_inflection), a component that does not stand out of the noise 3; 10 components that come faster wait in the
+// One sample a clock, waveforms back to back, with the sink always ready. An echo takes 73 cycles in fixed point at FRAC 16
+// (openecho_inflection), a component that does not stand out of the noise 5; 10 components that come faster wait in the
 // queue of openecho_detect. Nothing is lost: a queue that fills up stops the input, and only the input. What has been
 // taken in goes on to the queue without a stall, so that no path leads from the output back through all modules.
 // The settings n, min_interval, min_amplitude and k must not change while a waveform is in the core.

@@ -108,11 +108,10 @@ module openecho_detect
   } state_e;
   state_e state_q, state_d;
 
-  logic run_starts, run_cut, run_over, longer, kept, falls, higher;
-  logic single_q;  // the run has one beat so far
+  logic run_starts, run_cut, run_over, kept, falls, higher;
   logic truncated_q, has_peak_q;
-  logic [INDEX_W-1:0] run_q;  // beats of the run before this one
-  logic [INDEX_W-1:0] unused_excess;
+  logic [INDEX_W-1:0] run_q;  // beats of the run, with this one
+  logic long_q, long_q2;  // with this one there are more than min_interval; without it
   logic [SAMPLE_W-1:0] maximum_q, unused_height;
 
   assign run_starts = full_q && !positive_q && state_q != BELOW;
@@ -126,10 +125,8 @@ module openecho_detect
     if (last_q) state_d = IDLE;
   end
 
-  // Comparisons by a carry: x + ~y overflows where x > y. A run that is cut counts this beat too; one that begins and is
-  // cut at once is too short to matter.
-  assign {longer, unused_excess} = {1'b0, run_q} + {1'b0, ~min_interval} + LENGTH_W'(run_cut);
-  assign kept = valid_q && longer && ((run_over && !single_q) || (run_cut && !truncated_q));
+  assign kept = valid_q && ((run_over && long_q2) || (run_cut && long_q && !truncated_q));
+  // x + ~y carries where x > y.
   assign {higher, unused_height} = {1'b0, raw_q} + {1'b0, ~maximum_q};
   assign falls = climbing_q2 && !climbing_q && !positive_q;
 
@@ -137,8 +134,10 @@ module openecho_detect
     if (rst) state_q <= IDLE;
     else if (valid_q) state_q <= state_d;
     if (valid_q) begin
-      run_q <= run_starts ? INDEX_W'(1) : run_q + 1'b1;
-      single_q <= run_starts;
+      run_q <= run_starts ? INDEX_W'(2) : run_q + 1'b1;
+      if (run_starts) long_q <= min_interval <= 1;
+      else long_q <= long_q || run_q == min_interval;
+      long_q2 <= long_q && !run_starts;
       if (run_starts) truncated_q <= state_q == IDLE;
       else if (run_cut) truncated_q <= 1'b1;
       has_peak_q <= falls || (has_peak_q && !run_starts);
@@ -186,7 +185,7 @@ module openecho_detect
   logic [SLOT_W-1:0] head_slot_q;
   logic [  ZERO_W:0] inflection;
   logic [ZERO_W-1:0] peak;
-  assign inflection = inflections[{head_slot_q, crossing==CROSSING_RIGHT}];
+  assign inflection = inflections[{head_slot_q, crossing[1]}];
   assign peak = peaks[head_slot_q];
   assign {m_edge, m_bin, y, y_next} = crossing == CROSSING_PEAK ? {1'b0, peak} : inflection;
   assign m_y = SECOND_W'(y) << EMPTY_W;

@@ -19,24 +19,29 @@ module openecho_fifo #(
   localparam int ADDRESS_W = $clog2(DEPTH);
 
   logic [WIDTH-1:0] memory[DEPTH];
-  logic [ADDRESS_W:0] write_q, read_q;  // one bit more than the address tells full from empty
+  logic [ADDRESS_W-1:0] write_q, read_q;
+  logic push, pop;
 
-  assign level   = write_q - read_q;
-  assign s_ready = write_q != {!read_q[ADDRESS_W], read_q[ADDRESS_W-1:0]};
-  assign m_valid = write_q != read_q;
-  assign m_data  = memory[read_q[ADDRESS_W-1:0]];
+  assign s_ready = !level[ADDRESS_W];
+  assign m_data = memory[read_q];
+  assign push = s_valid && s_ready;
+  assign pop = m_valid && m_ready;
 
   always_ff @(posedge clk) begin
-    if (s_valid && s_ready) memory[write_q[ADDRESS_W-1:0]] <= s_data;
+    if (push) memory[write_q] <= s_data;
   end
 
   always_ff @(posedge clk) begin
     if (rst) begin
       write_q <= '0;
       read_q  <= '0;
+      level   <= '0;
+      m_valid <= 1'b0;
     end else begin
-      if (s_valid && s_ready) write_q <= write_q + 1'b1;
-      if (m_valid && m_ready) read_q <= read_q + 1'b1;
+      write_q <= write_q + ADDRESS_W'(push);
+      read_q  <= read_q + ADDRESS_W'(pop);
+      if (push != pop) level <= level + {{ADDRESS_W{pop}}, 1'b1};
+      m_valid <= push || level > 1 || (m_valid && !pop);
     end
   end
 endmodule

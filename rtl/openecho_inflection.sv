@@ -4,14 +4,14 @@
 // The trailer of a waveform (m_last) carries its length, its noise mean and, as amplitude, its noise deviation. A
 // component without a peak has FLAG_NO_PEAK and m_peak undefined.
 //
-// In fixed point one interpolation at a time: an echo takes 3 of them and 6 cycles more, 72 at FRAC 16, a component that
-// is dropped 3 cycles. The input is taken at one beat a clock, while the queue of openecho_detect takes up what comes
+// In fixed point one interpolation at a time: an echo takes 3 of them and 7 cycles more, 73 at FRAC 16, a component that
+// is dropped 5 cycles. The input is taken at one beat a clock, while the queue of openecho_detect takes up what comes
 // faster. When what is left of it is just enough for the beats on their way, s_ready falls.
 //
 // s_ready comes from a register, and a source that goes on sending for IN_FLIGHT beats after it falls may do so if
 // IN_FLIGHT is above 0: each of its beats is taken. So a whole pipeline before this module can do without stalls.
 //
-// Latency from the last beat of a waveform without a run in work to its trailer: 5 cycles.
+// Latency from the last beat of a waveform without a run in work to its trailer: 6 cycles.
 module openecho_inflection
   import openecho_pkg::*;
 #(
@@ -65,15 +65,16 @@ module openecho_inflection
       .TAP_COUNT(TAP_COUNT)
   ) u_check ();
 
-  typedef enum logic [2:0] {
-    HEAD,   // waits for a component or an end, and for the waveform's threshold
-    TEST,
-    LEFT,
-    PEAK,
-    RIGHT,
-    PLACE,  // the last position is on its way, in floating point
-    OFFER,
-    DONE    // with the head of the queue, and behind a trailer with the noise of its waveform
+  typedef enum logic [4:0] {
+    HEAD   = 5'b00000,  // waits for a component or an end, and for the waveform's threshold
+    EXCESS = 5'b00001,  // the maximum becomes an amplitude
+    TEST   = 5'b00010,
+    LEFT   = 5'b00100,  // bits 1 and 0 are the crossing; drops the component if it is not kept
+    PEAK   = 5'b00101,
+    RIGHT  = 5'b00110,
+    PLACE  = 5'b00011,  // the last position is on its way, in floating point
+    OFFER  = 5'b01000,
+    DONE   = 5'b10000   // with the head of the queue, and behind a trailer with the noise of its waveform
   } state_e;
   state_e state_q, state_d;
 
@@ -83,7 +84,7 @@ module openecho_inflection
   logic [1:0] crossing, place;
   logic [INDEX_W-1:0] crossing_bin;
   logic signed [SECOND_W-1:0] crossing_y, crossing_y_next;
-  logic at_head, armed, kept, interpolating, crossing_taken, position_valid, placed;
+  logic at_head, at_excess, armed, kept, interpolating, crossing_taken, position_valid, placed;
   logic [POSITION_W-1:0] position;
 
   openecho_detect #(
@@ -130,8 +131,9 @@ module openecho_inflection
       .noise_mean,
       .noise_deviation,
       .armed,
-      .enable(at_head),
-      .finish(head_last),
+      .load(at_head),
+      .subtract(at_excess),
+      .finish(m_last),
       .maximum(head_maximum),
       .amplitude(m_amplitude),
       .kept
@@ -146,7 +148,7 @@ module openecho_inflection
   ) u_interpolate (
       .clk,
       .rst,
-      .s_valid(interpolating),
+      .s_valid(interpolating && kept),
       .s_ready(crossing_taken),
       .s_crossing(crossing),
       .s_edge(crossing_edge),
@@ -158,27 +160,23 @@ module openecho_inflection
   );
 
   always_comb begin
-    state_d  = state_q;
-    crossing = CROSSING_LEFT;
+    state_d = state_q;
     case (state_q)
-      HEAD: begin
-        if (head_valid && armed) state_d = TEST;
-        if (head_valid && armed && head_last) state_d = OFFER;
+      HEAD:   if (head_valid && armed) state_d = EXCESS;
+      EXCESS: begin
+        state_d = TEST;
+        if (m_last) state_d = OFFER;
       end
-      TEST: begin
-        state_d = DONE;
-        if (kept) state_d = LEFT;
-      end
+      TEST:    state_d = LEFT;
       LEFT: begin
         if (crossing_taken) state_d = PEAK;
         if (crossing_taken && head_flags[FLAG_NO_PEAK]) state_d = RIGHT;
+        if (!kept) state_d = DONE;
       end
       PEAK: begin
-        crossing = CROSSING_PEAK;
         if (crossing_taken) state_d = RIGHT;
       end
       RIGHT: begin
-        crossing = CROSSING_RIGHT;
         if (crossing_taken) state_d = PLACE;
         if (placed) state_d = OFFER;
       end
@@ -189,9 +187,11 @@ module openecho_inflection
   end
 
   assign at_head = state_q == HEAD;
-  assign interpolating = state_q == LEFT || state_q == PEAK || state_q == RIGHT;
-  assign head_ready = state_q == DONE;
-  assign noise_ready = state_q == DONE && m_last;
+  assign at_excess = state_q == EXCESS;
+  assign interpolating = state_q[2];
+  assign crossing = state_q[1:0];
+  assign head_ready = state_q[4];
+  assign noise_ready = head_ready && m_last;
 
   always_ff @(posedge clk) begin
     if (rst) state_q <= HEAD;
@@ -216,7 +216,7 @@ module openecho_inflection
   end
   assign placed  = position_valid && place == CROSSING_RIGHT;
 
-  assign m_valid = state_q == OFFER;
+  assign m_valid = state_q[3];
   assign m_mean  = noise_mean;
   always_comb begin
     m_flags = head_flags;

@@ -9,8 +9,9 @@
 //
 // Fixed point (EXP_W 0): rounded half up to FRAC bits. One adder: it forms |y'|, twice |y| + |y'|, twice |y|, and then a
 // quotient bit a clock, non-restoring: a negative remainder means that the last subtraction was one too many, so the next
-// step adds. Where |y'| is zero, or both at the edge, the quotient is all ones, which is 1 after rounding. FRAC + 6
-// cycles, for which the operands stay.
+// step adds. What it adds or subtracts is in a register, for a short path; of a number to be added it is the complement.
+// Where |y'| is zero the quotient is all ones, which is 1 after rounding, and so it is made at the edge. FRAC + 6 cycles,
+// for which the operands stay.
 //
 // Floating point: sum, quotient and position are each rounded to nearest even. One serial divider and one serial adder,
 // which forms the sum for the next division while one is under way: the divider sets the pace. `base` is exact where
@@ -48,44 +49,37 @@ module openecho_interpolate
 
     logic [STEP_W-1:0] step_q;
     logic start, next_q, sum_q, value_q, done_q;  // |y'|, 2 (|y| + |y'|), 2 |y| is formed; the quotient is there
-    logic twice_q;  // sum_q or value_q
-    logic peak_q, rising_q, add_q;
+    logic rising, peak_q, edge_q;
+    logic inverted_q, negative_q, unused_borrow;
     logic [INDEX_W-1:0] bin_q;
-    logic signed [VALUE_W-1:0] y_q, y_next_q;
-    logic [ADDER_W-1:0] divisor_q, operand, sum;
-    logic [ADDER_W-2:0] remainder_q;  // without its sign, which is add_q
-    logic [QUO_W-1:0] quotient_q;
-    logic unused_borrow;
+    logic [ADDER_W-1:0] divisor_q, operand_q, sum;
+    logic [ADDER_W-2:0] remainder_q;  // without its sign, which is negative_q
+    logic [  QUO_W-1:0] quotient_q;
 
     assign start = step_q == '0;
+    assign rising = s_crossing == CROSSING_RIGHT;
 
-    always_comb begin
-      operand = divisor_q;
-      if (next_q) operand = ADDER_W'(y_next_q);
-      if (twice_q) operand = ADDER_W'(y_q) <<< 1;
-    end
-
-    assign {sum, unused_borrow} = {remainder_q, 2'b0} - {operand ^ {ADDER_W{add_q}}, add_q};
+    assign {sum, unused_borrow} = {remainder_q, 2'b0} - {operand_q ^ {ADDER_W{negative_q}}, inverted_q || negative_q};
 
     always_ff @(posedge clk) begin
       if (rst || !s_valid || done_q) step_q <= '0;
       else step_q <= step_q + 1'b1;
-      twice_q <= next_q || sum_q;
       {value_q, sum_q, next_q} <= rst ? '0 : {sum_q, next_q, s_valid && start && !done_q};
       done_q <= !rst && step_q == STEP_W'(QUO_W + 3);
       if (start) begin
         peak_q <= s_crossing == CROSSING_PEAK;
-        rising_q <= s_crossing == CROSSING_RIGHT;
-        bin_q <= s_bin;
-        y_q <= s_edge ? '0 : s_y;
-        y_next_q <= s_edge ? '0 : s_y_next;
+        edge_q <= s_edge;
+        bin_q  <= s_bin;
       end
+
+      if (start) {inverted_q, operand_q} <= {rising, ADDER_W'(s_y_next) ^ {ADDER_W{rising}}};
+      if (next_q) {inverted_q, operand_q} <= {!rising, (ADDER_W'(s_y) <<< 1) ^ {ADDER_W{!rising}}};
+      if (value_q) {inverted_q, operand_q} <= {1'b0, divisor_q};
+
       if (sum_q) divisor_q <= sum;
       remainder_q <= start || sum_q ? '0 : sum[ADDER_W-2:0];
-      if (start) add_q <= s_crossing == CROSSING_RIGHT;
-      else if (next_q || sum_q) add_q <= !rising_q;
-      else add_q <= !value_q && sum[ADDER_W-1];
-      if (!done_q) quotient_q <= {quotient_q[QUO_W-2:0], !sum[ADDER_W-1]};
+      negative_q  <= !start && sum[ADDER_W-1];
+      if (!done_q) quotient_q <= {quotient_q[QUO_W-2:0], edge_q || !sum[ADDER_W-1]};
     end
 
     logic unused_half;

@@ -153,9 +153,9 @@ module openecho_noise
     end
   endfunction
 
-  logic busy_q, done, fetch, clear;
+  logic busy_q, fetching_q, done, fetch, clear;
   logic [1:0] fetched_q;  // a cycle ago, two cycles ago: a digit of S and a pair of D are here, a digit of the root is
-  logic [STEP_W-1:0] step_q;  // weight of the digit to fetch; -1: none
+  logic [STEP_W-1:0] step_q;  // weight of the digit to fetch
   logic sum_digit_q, root_digit;
   logic [1:0] pair_q;
   logic [REST_W:0] mean_step, deviation_step;
@@ -170,8 +170,8 @@ module openecho_noise
   logic [TURN_W-1:0] turned;
   assign turned = TURN_W'({2{TURN_W'(~spread_n)}} >> (TURN_W - 2 * ROOT_FRAC));
 
-  assign fetch  = busy_q && step_q != '1;
-  assign done   = busy_q && step_q == '1 && fetched_q == '0;
+  assign fetch  = busy_q && fetching_q;
+  assign done   = busy_q && !fetching_q && fetched_q == '0;
   assign clear  = !busy_q || (done && m_ready);
 
   openecho_square_root #(
@@ -204,8 +204,9 @@ module openecho_noise
     end
     sum_digit_q <= 1'((2 ** STEP_W)'(sum_held_q) >> step_q);
     pair_q <= 32'(step_q) < ROOT_FRAC ? '0 : 2'(turned >> {step_q[TURN_STEP_W-1:0], 1'b0});
+    fetching_q <= clear || (fetching_q && step_q != '0);
     if (clear) step_q <= STEP_W'(ROOT_W - 1);
-    else if (fetch) step_q <= step_q - 1'b1;
+    else step_q <= step_q - 1'b1;
     if (clear) begin
       {mean_q, mean_rest_q} <= '0;
       {deviation_q, deviation_rest_q} <= '0;

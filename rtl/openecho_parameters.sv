@@ -12,7 +12,10 @@
 // Latency 1 cycle for a trailer. One component at a time; the next is taken while its record is solved for and waits.
 //
 // Fixed point (EXP_W 0): one adder for all, divisions at a bit a clock, K with POSITION_W fraction bits, each result
-// rounded half up. An echo takes 2 POSITION_W + 8 cycles: 64 at FRAC 16.
+// rounded half up. Non-restoring: a negative remainder means that the last subtraction was one too many, so the next step
+// adds. So that a path ends behind the adder, its sign alone decides on the next step and is the bit of a quotient: the
+// division by n works on the complement of the span and leaves the width, that by K leaves the complement of its quotient,
+// and either is then added. An echo takes 2 POSITION_W + 8 cycles: 64 at FRAC 16.
 //
 // Floating point: left + right, left - right, its quotient by n, that one's by K rounded to the format, and the sum with
 // the centre, each rounded to nearest even by one serial unit; halving is exact. The span is taken negative, so that every
@@ -61,23 +64,23 @@ module openecho_parameters
       .MAX_SAMPLES(MAX_SAMPLES)
   ) u_check ();
 
-  // From CENTRE to TIME one operation after the other. Bits 3 to 1 say what is added or subtracted in fixed point.
+  // From CENTRE to TIME one operation after the other. The bits choose operands in fixed point, the highest is m_valid.
   // (Icarus 11 takes no enum inside a generate block.)
-  localparam logic [3:0] IDLE = 4'b0000;  // takes a trailer
-  localparam logic [3:0] OFFER = 4'b0001;
-  localparam logic [3:0] CENTRE = 4'b1000;  // right + left
-  localparam logic [3:0] SPAN = 4'b1001;  // right - left, which are read for the last time: takes the component
-  localparam logic [3:0] WIDTH = 4'b0100;  // divides by n
-  localparam logic [3:0] QUARTER = 4'b0101;  // of the FWHM: divides by K
-  localparam logic [3:0] ROUND = 4'b0010;  // the width, in fixed point
-  localparam logic [3:0] TIME = 4'b0011;  // centre - quarter
+  localparam logic [4:0] IDLE = 5'b00000;  // takes a trailer
+  localparam logic [4:0] CENTRE = 5'b01000;  // left + right
+  localparam logic [4:0] SPAN = 5'b01001;  // of the two, which are read for the last time: takes the component
+  localparam logic [4:0] WIDTH = 5'b00100;  // divides by n
+  localparam logic [4:0] ROUND = 5'b00001;  // the width, in fixed point
+  localparam logic [4:0] QUARTER = 5'b00101;  // of the FWHM: divides by K
+  localparam logic [4:0] TIME = 5'b00010;  // centre - quarter
+  localparam logic [4:0] OFFER = 5'b10000;
 
   localparam int FRACTION_W = 56;
   localparam logic [FRACTION_W-1:0] K_FRACTION = 56'hb2da_4e98_08a5_2c;  // of K = 1.69864..., cut
 
-  logic [3:0] state_q, state_d;
+  logic [4:0] state_q, state_d;
   logic solved;  // the operation of this state is done
-  logic width_solved;
+  logic centre_solved, width_solved;  // `centre` is known, and the component still there; `width` is known
   logic last_q;
   logic [FLAGS_W-1:0] flags_q;
   logic [AMP_W-1:0] amplitude_q;
@@ -113,12 +116,14 @@ module openecho_parameters
       peak_q   <= VALUE_W'(s_mean);
       width_q  <= '0;
     end
-    if (state_q == CENTRE && solved) centre_q <= centre;
-    if (state_q == SPAN) peak_q <= s_flags[FLAG_NO_PEAK] ? centre_q : VALUE_W'(s_peak);
+    if (centre_solved) begin
+      centre_q <= centre;
+      peak_q   <= s_flags[FLAG_NO_PEAK] ? centre : VALUE_W'(s_peak);
+    end
     if (width_solved) width_q <= width;
   end
 
-  assign m_valid  = state_q == OFFER;
+  assign m_valid  = state_q[4];
   assign m_last   = last_q;
   assign m_centre = centre_q;
   assign m_peak   = peak_q;
@@ -135,41 +140,42 @@ module openecho_parameters
     localparam int ADDER_W = POSITION_W + RATIO_W - RATIO_FRAC + 1;
 
     logic [ STEP_W-1:0] step_q;  // of a division: those to come
-    logic [RATIO_W-1:0] divisor_q;
+    logic [ADDER_W-1:0] divisor_q;
     logic [ADDER_W-1:0] a, b, sum;
-    logic [ADDER_W-1:0] remainder_q;  // the first of a division is its numerator; that after TIME is the time
-    logic [  QUO_W-1:0] quotient_q;
-    logic positions, dividing, subtract_q, carry, unused_carry;
+    logic [ADDER_W-1:0] remainder_q;  // before a division its numerator; after TIME the time
+    logic [  QUO_W-1:0] quotient_q;  // before WIDTH the right inflection
+    logic positions, dividing, negative_q, borrow, unused_borrow;
 
     assign positions = state_q[3];
     assign dividing = state_q[2];
     assign solved = !dividing || step_q == '0;
 
-    // Non-restoring: after a negative remainder a step adds where it would subtract.
     always_comb begin
       a = remainder_q << 1;
-      if (positions) a = ADDER_W'(s_right);
-      else if (state_q[1:0] == TIME[1:0]) a = ADDER_W'(centre_q);
-      b = ADDER_W'(quotient_q[QUO_W-1:1]);
-      if (positions) b = ADDER_W'(s_left);
-      else if (dividing) b = state_q[0] ? ADDER_W'(K) : ADDER_W'(divisor_q) << (POSITION_W - RATIO_FRAC);
-      carry = quotient_q[0] ^ subtract_q;
-      if (positions) carry = 1'b1;
-      else if (dividing) carry = subtract_q;
+      a[0] = state_q == WIDTH;
+      if (positions) a = ADDER_W'(s_left);
+      else if (state_q[1]) a = ADDER_W'(centre_q);
+      b = {{(ADDER_W - POSITION_W) {state_q[1]}}, quotient_q[QUO_W-1:1]};
+      if (dividing) b = divisor_q;
+      borrow = !quotient_q[0];
+      if (positions) borrow = state_q[0];
+      else if (dividing) borrow = negative_q;
     end
 
-    assign {sum, unused_carry} = {a, carry} + {b ^ {ADDER_W{subtract_q}}, carry};
+    assign {sum, unused_borrow} = {a, 1'b0} - {b ^ {ADDER_W{negative_q}}, borrow};
 
     always_ff @(posedge clk) begin
       step_q <= dividing ? step_q - 1'b1 : STEP_W'(QUO_W - 1);
-      divisor_q <= divisor;
-      if (state_q == IDLE || (dividing && solved)) remainder_q <= '0;
-      else if (state_q != OFFER) remainder_q <= sum;
-      subtract_q <= state_d != CENTRE && state_d != ROUND && !(dividing && !solved && sum[ADDER_W-1]);
-      if (dividing) quotient_q <= {quotient_q[QUO_W-2:0], !sum[ADDER_W-1]};
+      divisor_q <= ADDER_W'(divisor) << (POSITION_W - RATIO_FRAC);
+      if (state_q == ROUND || state_q == QUARTER) divisor_q <= ADDER_W'(K);
+      if (!m_valid) {negative_q, remainder_q} <= {sum[ADDER_W-1], sum};
+      if (state_q == IDLE || (dividing && solved)) {negative_q, remainder_q} <= {1'b1, ADDER_W'(0)};
+      if (state_q == IDLE) quotient_q <= {s_right, 1'b0};
+      else if (dividing) quotient_q <= {quotient_q[QUO_W-2:0], sum[ADDER_W-1]};
     end
 
-    assign centre = VALUE_W'(sum[POSITION_W:1]);
+    assign centre = VALUE_W'(remainder_q[POSITION_W:1]);
+    assign centre_solved = state_q == SPAN;
     assign width = VALUE_W'(sum[POSITION_W-1:0]);
     assign width_solved = state_q == ROUND;
     assign m_time = VALUE_W'($signed(remainder_q[POSITION_W:0]));
@@ -243,6 +249,7 @@ module openecho_parameters
     );
 
     assign centre = VALUE_W'({result[POSITION_W-1:FRAC] - (1 + EXP_W)'(1), result[FRAC-1:0]});
+    assign centre_solved = state_q == SPAN && issue;  // the result is still that of the step before
     assign width_solved = state_q == WIDTH && solved;
     assign width = VALUE_W'({1'b0, result[POSITION_W-2:0]});
     assign m_time = last_q ? '0 : VALUE_W'($signed(result));

@@ -3,9 +3,9 @@
 // components are echoes.
 //
 // `armed` rises 9 cycles after noise_valid, when k * deviation has been added up bit by bit of k, and falls when the
-// noise figures are taken; until then they, and the settings, hold still. `amplitude` follows a cycle later while `enable`
-// is set, as it has to be until `armed` rises; `kept` belongs to it. With `finish` set, amplitude is the noise deviation, as a
-// trailer has it.
+// noise figures are taken; until then they, and the settings, hold still. `load` takes the maximum into `amplitude`,
+// where `subtract`, the cycle after, makes an amplitude of it; `kept` is known two cycles after `subtract`. `load` has to be
+// set until `armed` rises. With `finish` it takes the noise deviation, as a trailer has it.
 module openecho_threshold
   import openecho_pkg::*;
 #(
@@ -21,7 +21,8 @@ module openecho_threshold
     input  logic [   AMP_W-1:0] noise_mean,
     input  logic [   AMP_W-1:0] noise_deviation,
     output logic                armed,
-    input  logic                enable,
+    input  logic                load,
+    input  logic                subtract,
     input  logic                finish,
     input  logic [SAMPLE_W-1:0] maximum,
     output logic [   AMP_W-1:0] amplitude,
@@ -30,30 +31,29 @@ module openecho_threshold
   localparam int LIMIT_W = AMP_W + RATIO_W;  // k * deviation, AMP_FRAC + RATIO_FRAC fraction bits
   localparam int STEP_W = $clog2(RATIO_W);
 
-  logic started_q, negative_q;
+  logic started_q, digit_q, negative_q;
   logic [ STEP_W-1:0] bit_q;  // of k, the highest first
   logic [LIMIT_W-1:0] limit_q;
 
   always_ff @(posedge clk) begin
+    digit_q <= k[bit_q];
     if (rst || !noise_valid || noise_taken) begin
       started_q <= 1'b0;
       armed <= 1'b0;
-      bit_q <= STEP_W'(RATIO_W - 1);
+      bit_q <= '1;
       limit_q <= '0;
     end else begin
       started_q <= 1'b1;
+      bit_q <= bit_q - 1'b1;
       if (started_q && !armed) begin
-        armed   <= bit_q == '0;
-        bit_q   <= bit_q - 1'b1;
-        limit_q <= (limit_q << 1) + (k[bit_q] ? LIMIT_W'(amplitude) : '0);
+        armed   <= bit_q == '1;
+        limit_q <= (limit_q << 1) + (digit_q ? LIMIT_W'(amplitude) : '0);
       end
     end
-    if (enable) begin
-      {negative_q, amplitude} <= {1'b0, maximum, AMP_FRAC'(0)} - {1'b0, noise_mean};
-      if (!armed || finish) amplitude <= noise_deviation;
-    end
+    if (load) amplitude <= {maximum, AMP_FRAC'(0)};
+    if (subtract) {negative_q, amplitude} <= {1'b0, amplitude} - {1'b0, noise_mean};
+    if (load && !armed || subtract && finish) amplitude <= noise_deviation;
+    kept <= !negative_q && amplitude[AMP_W-1:AMP_FRAC] >= min_amplitude
+            && {(RATIO_W - RATIO_FRAC)'(0), amplitude, RATIO_FRAC'(0)} >= limit_q;
   end
-
-  assign kept = !negative_q && amplitude[AMP_W-1:AMP_FRAC] >= min_amplitude
-              && {(RATIO_W - RATIO_FRAC)'(0), amplitude, RATIO_FRAC'(0)} >= limit_q;
 endmodule

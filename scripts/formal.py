@@ -114,20 +114,26 @@ FIFO_FAULTS = (
     Change(
         "a full queue takes one word more",
         "openecho_fifo.sv",
-        "assign s_ready = write_q != {!read_q[ADDRESS_W], read_q[ADDRESS_W-1:0]};",
+        "assign s_ready = !level[ADDRESS_W];",
         "assign s_ready = level <= (ADDRESS_W + 1)'(DEPTH);",
     ),
     Change(
         "an empty queue hands out a word",
         "openecho_fifo.sv",
-        "if (m_valid && m_ready) read_q <= read_q + 1'b1;",
-        "if (m_ready) read_q <= read_q + 1'b1;",
+        "assign pop = m_valid && m_ready;",
+        "assign pop = m_ready;",
     ),
     Change(
         "words leave out of order",
         "openecho_fifo.sv",
-        "assign m_data  = memory[read_q[ADDRESS_W-1:0]];",
-        "assign m_data  = memory[read_q[ADDRESS_W-1:0] ^ ADDRESS_W'(level[1])];",
+        "assign m_data = memory[read_q];",
+        "assign m_data = memory[read_q^ADDRESS_W'(level[1])];",
+    ),
+    Change(
+        "the last word but one is forgotten",
+        "openecho_fifo.sv",
+        "m_valid <= push || level > 1 ||",
+        "m_valid <= push || level > 2 ||",
     ),
 )
 READER_FAULTS = (
@@ -204,8 +210,8 @@ DETECT_FAULTS = (
     Change(
         "a run of one beat is kept",
         "openecho_detect.sv",
-        "single_q <= run_starts;",
-        "single_q <= 1'b0;",
+        "long_q2 <= long_q && !run_starts;",
+        "long_q2 <= long_q;",
     ),
     Change(
         "the state stays from one waveform to the next",
@@ -244,8 +250,8 @@ INTERPOLATE_FAULTS = (
     Change(
         "differences beyond the edge count",
         "openecho_interpolate.sv",
-        "y_next_q <= s_edge ? '0 : s_y_next;",
-        "y_next_q <= s_y_next;",
+        "edge_q || !sum[ADDER_W-1]};",
+        "!sum[ADDER_W-1]};",
     ),
 )
 ROWS = (
@@ -381,14 +387,14 @@ ROWS = (
             Change(
                 "a bit of k too few",
                 "openecho_threshold.sv",
-                "bit_q <= STEP_W'(RATIO_W - 1);",
-                "bit_q <= STEP_W'(RATIO_W - 2);",
+                "armed   <= bit_q == '1;",
+                "armed   <= bit_q == '0;",
             ),
             Change(
                 "samples below the mean are kept",
                 "openecho_threshold.sv",
-                "assign kept = !negative_q && amplitude",
-                "assign kept = amplitude",
+                "kept <= !negative_q && amplitude",
+                "kept <= amplitude",
             ),
         ),
         depth=1,
@@ -415,14 +421,14 @@ ROWS = (
             Change(
                 "components that are kept are dropped too",
                 "openecho_inflection.sv",
-                "if (kept) state_d = LEFT;",
-                "if (kept && !head_flags[FLAG_NO_PEAK]) state_d = LEFT;",
+                "if (!kept) state_d = DONE;",
+                "if (!kept || head_flags[FLAG_NO_PEAK]) state_d = DONE;",
             ),
             Change(
                 "noise is taken behind a component",
                 "openecho_inflection.sv",
-                "assign noise_ready = state_q == DONE && m_last;",
-                "assign noise_ready = state_q == DONE;",
+                "assign noise_ready = head_ready && m_last;",
+                "assign noise_ready = head_ready;",
             ),
             Change(
                 "a stall of the output is ignored",
@@ -433,8 +439,8 @@ ROWS = (
             Change(
                 "nothing waits for the threshold",
                 "openecho_inflection.sv",
-                "if (head_valid && armed) state_d = TEST;",
-                "if (head_valid) state_d = TEST;",
+                "if (head_valid && armed) state_d = EXCESS;",
+                "if (head_valid) state_d = EXCESS;",
             ),
         ),
         depth=1,
@@ -502,8 +508,8 @@ ROWS = (
             ),
         ),
         mode="bmc",
-        depth=26,
-        cover_depth=34,
+        depth=30,
+        cover_depth=37,
         cover_parameters={"EASY": 1},
         reduced=(NO_NOISE, FEW_SLOTS),
         cut=(

@@ -129,11 +129,12 @@ def area(content: dict[str, Any]) -> list[str]:
         for name, row in named.items()
         if "float_" not in row["top"] or name.endswith("float64")
     ]
-    rate = named["core"]["fmax_mhz"] * 1e6 / 1024
+    with_dsp, without = (f"{named[name]['fmax_mhz'] * 1e6 / 1024:,.0f}" for name in ("core", "core without DSP"))
+    rates = f"{with_dsp} waveforms of 1024 samples a second, without DSP {without}; the paper {PAPER_RATE:,}"
     return [
         *table(head, [*rows, PAPER]),
         "",
-        f"At the ECP5's clock {rate:,.0f} waveforms of 1024 samples a second, the paper {PAPER_RATE:,}.",
+        f"At the ECP5's clock {rates}.",
     ]
 
 

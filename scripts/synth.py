@@ -70,7 +70,7 @@ class Build:
         return "fixed" if form is None else found[form.exp_w, form.frac_w]
 
     @property
-    def budget(self) -> hardware.Area | None:
+    def budget(self) -> hardware.Budget | None:
         """What this build may take, of those for which the module table says so."""
         return MODULES[self.module].budget if self.name == self.module else None
 

@@ -30,6 +30,8 @@ CONFIGS = {
     "float32": Config(exp_w=8, frac=23, max_samples=1100),
     "float16": Config(exp_w=5, frac=10, max_samples=1100),
     "bfloat16": Config(sample_w=8, exp_w=8, frac=7, max_samples=1100, taps=(3, 11, 16, 11, 3)),
+    # Quotients of so few bits that they come before their base has been converted.
+    "coarse": Config(exp_w=5, frac=2, max_samples=16384),
     # A format of its own, with as wide integers as there are to convert.
     "float24": Config(sample_w=16, exp_w=7, frac=16, max_samples=1100, taps=STEEP + STEEP[::-1]),
 }

@@ -105,7 +105,7 @@ def clocks_per_echo(config: Config) -> int:
     wait.
     """
     if config.form is None:
-        return max(3 * (config.frac + 6) + 6, 2 * config.pos_w + 9)
+        return max(3 * (config.frac + 6) + 7, 2 * config.pos_w + 9)
     return 12 * (config.frac + 6)
 
 

@@ -389,8 +389,10 @@ module detect_formal
       idle_until_the_window_is_full : assert ((2'(dut.state_q) == IDLE) == (processed <= TAP_COUNT + 1));
       same_run :
       assert (!in_run_q
-              || {dut.run_q, dut.single_q, dut.truncated_q, dut.maximum_q, dut.has_peak_q}
-                 == {run_q, run_q == 1, truncated_q, maximum_q, has_peak_q});
+              || {dut.run_q, dut.truncated_q, dut.maximum_q, dut.has_peak_q}
+                 == {run_q + INDEX_W'(1), truncated_q, maximum_q, has_peak_q});
+      same_length :
+      assert (!in_run_q || {dut.long_q, dut.long_q2} == {run_q >= min_interval_q, run_q > min_interval_q && run_q > 1});
       run_fits : assert (!in_run_q || (32'(run_q) <= processed - TAP_COUNT - 1 && run_q != '0));
       runs_in_range : assert (runs_q >= 0 && runs_q <= MAX_SAMPLES);
       runs_are_apart :
@@ -405,7 +407,8 @@ module detect_formal
       assert (!in_run_q || !has_peak_q
               || (FIRST_W'(SECOND_W'(peak_y_q)) == peak_y_q && FIRST_W'(SECOND_W'(peak_y_next_q)) == peak_y_next_q));
       slots_are_counted : assert (components + 32'(dut.popped_q) == 32'(dut.slots_q) + 32'(dut.component_q));
-      level_in_range : assert (32'(dut.entries) <= ENTRIES);
+      level_in_range : assert (32'(dut.entries) <= ENTRIES && m_valid == (dut.entries != '0));
+      pointers_agree : assert (dut.u_entries.write_q == dut.u_entries.read_q + ADDRESS_W'(dut.entries));
       slots_in_order : assert (dut.slot_q == dut.head_slot_q + SLOT_W'(components));
       components_are_counted : assert (components == components_found);
       ends_are_counted : assert (finishes == ends_found);

@@ -1,7 +1,7 @@
 // openecho_fifo: never over- or underfull, `level` is the number of words inside, and the n-th word in is the n-th word
 // out, unchanged. Proved by induction: for any length of time, with any stalls, gaps and resets.
 //
-// The one thing that induction has to be told is where the marked word is: `ahead` places behind the oldest.
+// Induction has to be told where the marked word is, `ahead` places behind the oldest, and that the pointers agree.
 module fifo_formal #(
     parameter int WIDTH = 4,
     parameter int DEPTH = 4
@@ -77,6 +77,7 @@ module fifo_formal #(
       level_is_words_inside : assert (32'(level) == count);
       offers_unless_empty : assert (m_valid == (count != 0));
       accepts_unless_full : assert (s_ready == (count != DEPTH));
+      pointers_agree : assert (dut.write_q == dut.read_q + ADDRESS_W'(level));
       marked_is_in_its_place : assert (!marked || dut.memory[place] == content);
     end
     cover_full_stalls : cover (started && s_valid && !s_ready);

@@ -6,7 +6,8 @@
 //
 // Proved by induction. The row cuts loose what comes out of openecho_detect, which has its own proof, the verdict,
 // which threshold_formal has, and the positions, which interpolate_formal has: the control is right for any of them.
-// Assumed: the head stays until it is taken, and so do the noise figures. Free: all else, resets among it.
+// Assumed: the head stays until it is taken, and so do the noise figures; the verdict stays for its component. Free: all
+// else, resets among it.
 module inflection_formal
   import openecho_pkg::*;
 #(
@@ -30,13 +31,13 @@ module inflection_formal
     input logic                m_ready
 );
   // The module's states.
-  localparam logic [2:0] HEAD = 3'd0, TEST = 3'd1, LEFT = 3'd2, PEAK = 3'd3, RIGHT = 3'd4, PLACE = 3'd5, OFFER = 3'd6,
-      DONE = 3'd7;
+  localparam logic [4:0] HEAD = 5'b00000, EXCESS = 5'b00001, TEST = 5'b00010, LEFT = 5'b00100,
+      PEAK = 5'b00101, RIGHT = 5'b00110, OFFER = 5'b01000, DONE = 5'b10000;
   localparam int OPERATION = FRAC + 6;  // cycles of an interpolation
   localparam int ARMING = RATIO_W + 1;
-  localparam int LIMIT = ARMING + 2 + 3 * OPERATION + 1;
+  localparam int LIMIT = ARMING + 3 + 3 * OPERATION + 1;
 
-  logic [2:0] state;
+  logic [4:0] state;
   logic started, noise_ready, unused_s_ready, m_valid, m_last;
   logic [POSITION_W-1:0] m_left, m_right, m_peak;
   logic [AMP_W-1:0] m_amplitude, m_mean;
@@ -79,7 +80,7 @@ module inflection_formal
       .m_flags
   );
 
-  assign state = 3'(dut.state_q);
+  assign state = 5'(dut.state_q);
 
   reset_formal u_reset (
       .clk,
@@ -125,8 +126,8 @@ module inflection_formal
   assign leave = m_valid && m_ready;
   always_ff @(posedge clk) begin
     offered_q <= !rst && !dut.head_ready && (offered_q || leave);
-    judged_q  <= !rst && !dut.head_ready && (judged_q || state == TEST);
-    if (state == TEST) kept_q <= dut.kept;
+    judged_q  <= !rst && !dut.head_ready && (judged_q || state == LEFT);
+    if (state == LEFT && !judged_q) kept_q <= dut.kept;
     trailer_left_q <= !rst && !noise_ready && (trailer_left_q || (leave && m_last));
     component_left_q <= !rst && (component_left_q || (leave && !m_last));
     dropped_q <= !rst && dut.head_ready && !offered_q;
@@ -143,9 +144,11 @@ module inflection_formal
     step = 32'(dut.u_interpolate.g_fixed.step_q);
     case (state)
       HEAD: begin
-        to_go = 2 + 3 * OPERATION + 1;
-        if (!dut.armed) to_go = to_go + (dut.u_threshold.started_q ? 32'(dut.u_threshold.bit_q) + 1 : ARMING);
+        to_go = 3 + 3 * OPERATION + 1;
+        if (!dut.armed)
+          to_go = to_go + (dut.u_threshold.started_q ? 32'(3'(dut.u_threshold.bit_q + 1'b1)) + 1 : ARMING);
       end
+      EXCESS: to_go = 2 + 3 * OPERATION + 1;
       TEST: to_go = 1 + 3 * OPERATION + 1;
       LEFT: to_go = 3 * OPERATION - step + 1;
       PEAK: to_go = 2 * OPERATION - step + 1;
@@ -166,6 +169,7 @@ module inflection_formal
   assign at_work   = state != HEAD && state != DONE;
   assign with_peak = !dut.head_flags[FLAG_NO_PEAK];
   always_comb begin
+    verdict_stays : assume (!judged_q || dut.kept == kept_q);
     if (started) begin
       takes_only_what_is_there : assert (!dut.head_ready || dut.head_valid);
       offered_once : assert (!(m_valid && offered_q));
@@ -180,12 +184,13 @@ module inflection_formal
       positions_of_this_component :
       assert (!m_valid || m_last || ({m_left, m_right} == {left_q, right_q} && (!with_peak || m_peak == peak_q)));
       // For the induction.
-      no_wait_for_a_place : assert (state != PLACE);
-      components_are_interpolated : assert (!at_work || state == OFFER || !dut.head_last);
+      known_state : assert (state inside {HEAD, EXCESS, TEST, LEFT, PEAK, RIGHT, OFFER, DONE});
+      components_are_interpolated : assert (!at_work || state == EXCESS || state == OFFER || !dut.head_last);
       last_of_the_head : assert (state == HEAD || m_last == dut.head_last);
       head_until_done : assert (state != DONE || (dut.head_valid && noise_valid && dut.armed));
       not_offered_before : assert (!offered_q || state == DONE);
-      judged_in_test : assert (judged_q == (!dut.head_last && state != HEAD && state != TEST));
+      judged_at_first :
+      assert (state == LEFT ? judged_q || step == 0 : judged_q == (!dut.head_last && state[4:2] != '0));
       kept_is_interpolated : assert (!judged_q || (state == DONE ? offered_q == kept_q : kept_q));
       trailer_left : assert (trailer_left_q == (state == DONE && m_last));
       end_is_offered : assert (!(state == DONE && m_last) || offered_q);

@@ -2,8 +2,8 @@
 // base + |y| / (|y| + |y'|), the quotient rounded half up, as the operator / has it, or base + 1 at the edge; base is
 // the bin with half a bin for an even TAP_COUNT and half a bin for a peak. Proved by induction, for all operands.
 //
-// Assumed: an operation stays until it is taken; y and y' are of the signs that their crossing has. Free: everything
-// else, gaps and resets among it.
+// Assumed: an operation stays until it is taken; y and y' are of the signs that their crossing has, but at the edge.
+// Free: everything else, gaps and resets among it.
 module interpolate_formal
   import openecho_pkg::*;
 #(
@@ -91,7 +91,7 @@ module interpolate_formal
     if (s_valid) begin
       known_crossing : assume (s_crossing != CROSSING_NONE);
       // From left to right + to 0 or -; at a right inflection - or 0 to +.
-      signs : assume (s_crossing == CROSSING_RIGHT ? s_y <= 0 && s_y_next > 0 : s_y > 0 && s_y_next <= 0);
+      signs : assume (s_edge || (s_crossing == CROSSING_RIGHT ? s_y <= 0 && s_y_next > 0 : s_y > 0 && s_y_next <= 0));
     end
     if (started) begin
       one_position_in_time : assert (m_valid == (32'(age_q) == LATENCY));
@@ -103,7 +103,7 @@ module interpolate_formal
     end
     cover_from_zero : cover (started && m_valid && s_y == '0 && !s_edge);
     cover_to_zero : cover (started && m_valid && s_y_next == '0 && !s_edge);
-    cover_edge : cover (started && m_valid && s_edge && s_crossing == CROSSING_RIGHT);
+    cover_edge : cover (started && m_valid && s_edge && s_y_next < 0 && s_crossing == CROSSING_RIGHT);
     cover_second : cover (started && m_valid && second_q && s_crossing == CROSSING_PEAK);
   end
 endmodule

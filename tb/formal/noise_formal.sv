@@ -139,7 +139,8 @@ module noise_formal
       position_in_range : assert (position_q >= 0 && position_q < MAX_SAMPLES);
       window_is_known : assert (dut.in_window_q == (position_q < NOISE_SAMPLES));
       limit_is_known : assert (dut.at_limit_q == (position_q == NOISE_SAMPLES - 1));
-      a_token_a_waveform : assert (32'(dut.u_tokens.level) == count);
+      a_token_a_waveform : assert (32'(dut.u_tokens.level) == count && dut.token_valid == (count != 0));
+      pointers_agree : assert (dut.u_tokens.write_q == ($clog2(TOKENS))'(32'(dut.u_tokens.read_q) + count));
       marked_is_in_its_place :
       assert (!marked || dut.u_tokens.memory[($clog2(TOKENS))'(32'(dut.u_tokens.read_q)+ahead)] == content);
       sums_of_one_waveform_in_work : assert (!(dut.held_q && completing != '0));

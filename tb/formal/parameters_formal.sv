@@ -142,14 +142,14 @@ module parameters_formal
 
   logic [$clog2(LATENCY+1)-1:0] age_q;  // cycles since a component was taken
   logic had_echo_q, known_state;
-  logic [3:0] state;
+  logic [4:0] state;
   always_ff @(posedge clk) begin
     n_q <= n_q;
     if (accept) age_q <= s_last ? ($clog2(LATENCY + 1))'(LATENCY) : ($clog2(LATENCY + 1))'(1);
     else if (32'(age_q) < LATENCY) age_q <= age_q + 1'b1;
     had_echo_q <= !rst && (had_echo_q || (m_valid && m_ready && !m_last));
   end
-  assign state = 4'(dut.state_q);
+  assign state = 5'(dut.state_q);
   always_comb begin
     if (count == 0) known_state = state == dut.IDLE || state == dut.CENTRE || state == dut.SPAN;
     else if (32'(age_q) == LATENCY) known_state = state == dut.OFFER;

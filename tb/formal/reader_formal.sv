@@ -135,6 +135,7 @@ module reader_formal
       limit_is_known : assert (dut.u_noise.at_limit_q == (32'(dut.index_q) == NOISE_SAMPLES - 1));
       output_is_what_is_inside : assert (m_valid == (count != 0));
       one_figure_a_waveform : assert (32'(dut.u_noise.u_tokens.level) == figures_q);
+      offers_unless_empty : assert (dut.u_noise.u_tokens.m_valid == (figures_q != 0));
       figures_in_range : assert (figures_q >= 0 && figures_q <= TOKENS);
       no_figure_before_its_window : assert (!noise_valid || figures_q > 0);
     end
