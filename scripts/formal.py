@@ -518,6 +518,70 @@ ROWS = (
             *("dut.u_parameters.solved", "dut.u_parameters.width_solved"),
         ),
     ),
+    Row(
+        "axi_lite",
+        "axi_lite",
+        "each write and each read done once and answered once, in order; held answers; bounded wait",
+        (
+            Change(
+                "an address is taken over one that waits for its data",
+                "axi/openecho_axi_lite.sv",
+                "assign s_axi_awready = awake_q && !address_held_q && !s_axi_bvalid;",
+                "assign s_axi_awready = awake_q && !s_axi_bvalid;",
+            ),
+            Change(
+                "the answer says what another write is told",
+                "axi/openecho_axi_lite.sv",
+                "if (write_valid) s_axi_bresp <= write_refused ? SLVERR : OKAY;",
+                "s_axi_bresp <= write_refused ? SLVERR : OKAY;",
+            ),
+            Change(
+                "an answer that waits is taken back",
+                "axi/openecho_axi_lite.sv",
+                "else if (s_axi_rready) s_axi_rvalid <= 1'b0;",
+                "else s_axi_rvalid <= 1'b0;",
+            ),
+        ),
+        depth=2,
+        cover_depth=12,
+    ),
+    Row(
+        "axi",
+        "axi",
+        "settings change, and a soft reset comes, only in an empty core; no waveform begins with old settings",
+        (
+            Change(
+                "settings change between waveforms while one is still inside",
+                "axi/openecho_axi.sv",
+                "assign empty = (change_waits_q || reset_waits_q) && !inside_q && flight_q == '0;",
+                "assign empty = (change_waits_q || reset_waits_q) && !inside_q;",
+            ),
+            Change(
+                "a change does not hold the next waveform",
+                "axi/openecho_axi.sv",
+                "assign hold = !awake_q || clear_q || ((change_waits_q || reset_waits_q) && !inside_q);",
+                "assign hold = !awake_q || clear_q || (reset_waits_q && !inside_q);",
+            ),
+            Change(
+                "an n of 0 is taken",
+                "axi/openecho_axi.sv",
+                "ADDRESS_N: illegal = (merged >> RATIO_W) != '0 || (merged >> RATIO_FRAC) == '0;",
+                "ADDRESS_N: illegal = (merged >> RATIO_W) != '0;",
+            ),
+            Change(
+                "an event is lost to a clear in its cycle",
+                "axi/openecho_axi.sv",
+                "irq_status_q <= events | (clear_q ? '0 : irq_status_q & ~clear_irq);",
+                "irq_status_q <= clear_q ? '0 : (events | irq_status_q) & ~clear_irq;",
+            ),
+        ),
+        depth=2,
+        cover_depth=16,
+        cut=(
+            "dut.core_s_ready",
+            *(f"dut.m_axis_{name}" for name in ("tvalid", "tlast", "tdata")),
+        ),
+    ),
 )
 """All that is proved."""
 
