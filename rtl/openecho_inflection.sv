@@ -65,6 +65,7 @@ module openecho_inflection
       .TAP_COUNT(TAP_COUNT)
   ) u_check ();
 
+  // Bits 2 to 4 are interpolating, m_valid and head_ready: a state costs no decoding on the longest paths.
   typedef enum logic [4:0] {
     HEAD   = 5'b00000,  // waits for a component or an end, and for the waveform's threshold
     EXCESS = 5'b00001,  // the maximum becomes an amplitude
