@@ -159,17 +159,14 @@ def _fit(
         y = rows[n, : lengths[n]]
         components = offset[n + 1] - offset[n]
         unknowns = 3 * components + 1
-        u, low, high = np.empty(unknowns), np.empty(unknowns), np.empty(unknowns)
-        u[0], low[0], high[0] = first[n], -1e3, 1e3
+        u = np.empty(unknowns)
+        u[0] = first[n]
         for k in range(components):
-            i, width = 3 * k + 1, np.log(max(1.0, float(len(y))))
-            low[i], high[i] = 0.0, 1e3
-            low[i + 1], high[i + 1] = -float(len(y)), 2.0 * len(y)
-            low[i + 2], high[i + 2] = np.log(LEAST_WIDTH), width
+            i = 3 * k + 1
             u[i], u[i + 1] = start[offset[n] + k, 0], start[offset[n] + k, 1]
             u[i + 2] = np.log(max(start[offset[n] + k, 2], LEAST_WIDTH))
-        u[:] = np.minimum(np.maximum(u, low), high)
-        normal, squares, converged[n] = _minimise(y, u, low, high)
+        low, high = borders(len(y), components)
+        normal, squares, converged[n] = minimise(y, u, low, high)
         freedom = max(len(y) - unknowns, 1)
         noise = np.sqrt(squares / freedom) if np.isnan(deviation[n]) else deviation[n]
         base[n], rms[n] = u[0], np.sqrt(squares / max(len(y), 1))
@@ -185,9 +182,21 @@ def _fit(
 
 
 @njit(cache=True)
-def _minimise(y: FloatArray, u: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, float, bool]:
+def borders(length: int, components: int) -> tuple[FloatArray, FloatArray]:
+    """Least and greatest baseline, and amplitude, centre and ln σ of each component; the greatest sample is 1."""
+    low, high = np.empty(3 * components + 1), np.empty(3 * components + 1)
+    low[0], high[0] = -1e3, 1e3
+    low[1::3], high[1::3] = 0.0, 1e3
+    low[2::3], high[2::3] = -float(length), 2.0 * length
+    low[3::3], high[3::3] = np.log(LEAST_WIDTH), np.log(max(1.0, float(length)))
+    return low, high
+
+
+@njit(cache=True)
+def minimise(y: FloatArray, u: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, float, bool]:
     """Move `u` to the least sum of squares; return the normal matrix there, the sum, and whether it is the least."""
     unknowns = len(u)
+    u[:] = np.minimum(np.maximum(u, low), high)
     normal, gradient = np.empty((unknowns, unknowns)), np.empty(unknowns)
     tried_normal, tried_gradient = np.empty_like(normal), np.empty_like(gradient)
     damped, step, tried = np.empty_like(normal), np.empty(unknowns), np.empty(unknowns)
