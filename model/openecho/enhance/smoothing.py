@@ -6,11 +6,17 @@ value, or to turn back where a spectrum is filtered.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import fft, ndimage
 
 FloatArray = NDArray[np.float64]
+
+MOST = np.finfo(np.float64).max
+CUT = 6
+"""Reach of the Gaussian, σ."""
 
 
 def moving_average(samples: ArrayLike, width: int) -> FloatArray:
@@ -34,11 +40,11 @@ def moving_average(samples: ArrayLike, width: int) -> FloatArray:
     """
     if width < 1 or width % 2 == 0:
         raise ValueError(f"width: found {width}, expected an odd number from 1")
-    return np.asarray(ndimage.uniform_filter1d(_rows(samples), width, mode="nearest"))
+    return _averaged(samples, lambda rows: ndimage.uniform_filter1d(rows, width, mode="nearest"))
 
 
 def gaussian(samples: ArrayLike, sigma: float) -> FloatArray:
-    """Convolution with a Gaussian, cut at 6 σ.
+    """Convolution with a Gaussian, cut at `CUT` σ.
 
     Parameters
     ----------
@@ -57,7 +63,9 @@ def gaussian(samples: ArrayLike, sigma: float) -> FloatArray:
         If `sigma` is not positive and finite.
     """
     _positive("sigma", sigma)
-    return np.asarray(ndimage.gaussian_filter1d(_rows(samples), sigma, mode="nearest", truncate=6))
+    # Of less than half a bin in `CUT` only the sample itself is left, and a square that doesn't underflow.
+    sigma = max(sigma, 0.25 / CUT)
+    return _averaged(samples, lambda rows: ndimage.gaussian_filter1d(rows, sigma, mode="nearest", truncate=CUT))
 
 
 def homomorphic(
@@ -66,9 +74,8 @@ def homomorphic(
     """Low-pass filter of the logarithm, in which speckle, a factor, is a summand (Oppenheim, Schafer & Stockham 1968).
 
     The frequency response is Butterworth's, 1 / (1 + (P/p)^(2 order)) at a period of p bins, without a shift; the
-    answer stays between the least and the greatest signal. What does
-    not stand `floor` above the baseline has no logarithm to speak of and counts as `floor`: additive noise is to be
-    taken away before, by accumulation or wavelets.
+    answer stays between the least and the greatest signal. What does not stand `floor` above the baseline has no
+    logarithm to speak of and counts as `floor`: additive noise is to be taken away before, by accumulation or wavelets.
 
     Parameters
     ----------
@@ -98,25 +105,39 @@ def homomorphic(
     _positive("floor", floor)
     if order < 1:
         raise ValueError(f"order: found {order}, expected 1 or more")
-    rows = _rows(samples)
+    rows = np.atleast_1d(_finite("samples", samples))
     if rows.size == 0:
         return rows
-    offset = np.asarray(baseline, np.float64)[..., None]
-    logarithm = np.log(np.maximum(rows - offset, floor))
+    offset = _finite("baseline", baseline)[..., None]
     # The cosine transform is that of a waveform that turns back at its ends.
     cycles = np.arange(rows.shape[-1]) / (2 * rows.shape[-1])
-    response = 1 / (1 + (period * cycles) ** (2 * order))
+    with np.errstate(over="ignore"):  # what float64 doesn't hold is its greatest value, or a response of 0
+        logarithm = np.log(np.clip(rows - offset, floor, MOST))
+        response = 1 / (1 + (period * cycles) ** (2 * order))
     filtered = fft.idct(fft.dct(logarithm, norm="ortho") * response, norm="ortho")
     # Behind a steep step the filter overshoots, which in a logarithm could be anything.
     inside = np.clip(filtered, logarithm.min(axis=-1, keepdims=True), logarithm.max(axis=-1, keepdims=True))
-    return np.asarray(np.exp(inside) + offset)
+    with np.errstate(over="ignore"):
+        return np.asarray(np.clip(np.exp(inside) + offset, -MOST, MOST))
 
 
-def _rows(samples: ArrayLike) -> FloatArray:
-    rows = np.array(samples, np.float64, ndmin=1)
-    if not np.isfinite(rows).all():
-        raise ValueError("samples: found a value that is not finite, expected finite ones")
-    return rows
+def _finite(name: str, values: ArrayLike) -> FloatArray:
+    found = np.asarray(values, np.float64)
+    if not np.isfinite(found).all():
+        raise ValueError(f"{name}: found a value that is not finite, expected finite ones")
+    return found
+
+
+def _averaged(samples: ArrayLike, average: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """Averages of samples, which are between the least and the greatest of their waveform."""
+    rows = np.atleast_1d(_finite("samples", samples))
+    if rows.size == 0:
+        return rows
+    # Powers of two lose no digit, and between -1/2 and 1/2 no sum overflows.
+    exponent = np.frexp(np.abs(rows).max(axis=-1, keepdims=True))[1] + 1
+    with np.errstate(over="ignore"):  # a rounded average may be past the greatest float64
+        averages = np.ldexp(average(np.ldexp(rows, -exponent)), exponent)
+    return np.asarray(np.clip(averages, rows.min(axis=-1, keepdims=True), rows.max(axis=-1, keepdims=True)))
 
 
 def _positive(name: str, value: float) -> None:

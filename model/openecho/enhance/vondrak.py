@@ -16,10 +16,11 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from openecho.compiled import njit, prange
+from openecho.compiled import njit, share
 
 FloatArray = NDArray[np.float64]
 
+MOST = np.finfo(np.float64).max
 ORDER = 3
 """Of the derivative that is kept small, and the number of parameters of the parabola that has none."""
 BAND = ORDER + 1
@@ -78,9 +79,11 @@ def vondrak(
     if epsilon > 0:
         larger = max(1.0, math.sqrt(epsilon))  # of the two sums' roots: over it, squares don't overflow
         follow = np.broadcast_to(math.sqrt(epsilon) / larger * root, rows.shape)
-        rest = _solve(rows - parabola, follow, _derivatives(at) / larger)
+        rest = np.empty_like(rows)
+        share(_solve, len(rows), rows - parabola, follow, _derivatives(at) / larger, rest)
         parabola += rest - _projected(rest, basis, root)
-    return np.asarray(parabola * scale).reshape(shape)
+    with np.errstate(over="ignore"):  # a smooth curve through ±1.7e308 may leave float64
+        return np.asarray(np.clip(parabola * scale, -MOST, MOST)).reshape(shape)
 
 
 def _positions(position: ArrayLike | None, count: int) -> FloatArray:
@@ -134,12 +137,13 @@ def _derivatives(at: FloatArray) -> FloatArray:
     return np.asarray(6 * np.sqrt(windows[:, 2] - windows[:, 1])[:, None] / steps.prod(axis=2))
 
 
-@njit(cache=True, parallel=True)
-def _solve(rows: FloatArray, weight: FloatArray, derivative: FloatArray) -> FloatArray:
+@njit(nogil=True)
+def _solve(
+    begin: int, end: int, rows: FloatArray, weight: FloatArray, derivative: FloatArray, solved: FloatArray
+) -> None:
     """Least squares of weight (s - row) = 0 and derivative s = 0, for each row."""
-    count, length = rows.shape
-    solved = np.empty_like(rows)
-    for n in prange(count):
+    length = rows.shape[1]
+    for n in range(begin, end):
         triangle = np.zeros((length, BAND))  # from the diagonal on
         right = np.zeros(length)
         equation = np.empty(BAND)
@@ -155,10 +159,9 @@ def _solve(rows: FloatArray, weight: FloatArray, derivative: FloatArray) -> Floa
             for k in range(1, min(BAND, length - i)):
                 value -= triangle[i, k] * solved[n, i + k]
             solved[n, i] = value / triangle[i, 0]
-    return solved
 
 
-@njit(cache=True)
+@njit()
 def _insert(triangle: FloatArray, right: FloatArray, i: int, equation: FloatArray, value: float) -> None:
     """Rotate an equation that begins in column `i` into the triangle, until nothing is left or a row is still free."""
     while i < len(right):
@@ -167,7 +170,7 @@ def _insert(triangle: FloatArray, right: FloatArray, i: int, equation: FloatArra
                 triangle[i] = equation
                 right[i] = value
                 return
-            length = np.sqrt(triangle[i, 0] ** 2 + equation[0] ** 2)
+            length = math.hypot(triangle[i, 0], equation[0])  # of which no square underflows
             cosine, sine = triangle[i, 0] / length, equation[0] / length
             for k in range(BAND):
                 above, below = triangle[i, k], equation[k]
