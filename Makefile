@@ -12,6 +12,7 @@ SEED   ?=
 WAVES  ?=
 CLOCK  ?=
 STEP   ?=
+QUICK  ?=
 
 VENV   := .venv
 READY  := $(VENV)/.ready
@@ -21,7 +22,7 @@ TAPS_FLAG  := $(if $(TAPS),--taps='$(TAPS)')
 SIM_FLAGS  := $(if $(MODULE),--module '$(MODULE)') $(ARITH_FLAG) $(TAPS_FLAG) $(if $(SIM),--sim '$(SIM)') \
               $(if $(DATA),--data '$(DATA)') $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(WAVES)),--waves)
 
-.PHONY: help sim replay test vectors lint format mutate formal synth vivado coverage precision score scale registers readme clean
+.PHONY: help sim replay test vectors lint format mutate formal synth vivado coverage precision score figures bench scale registers readme clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -66,6 +67,12 @@ score: $(READY) ## judge the echoes of every tap set by the references that a fi
 	@mkdir -p build/reports
 	@$(VENV)/bin/openecho score $(if $(DATA),'$(DATA)') $(ARITH_FLAG) --output build/reports/score.json
 
+figures: $(READY) ## the V–L paper's figures, ours: accumulation, wavelet, Vondrák, Gaussian against laser template [SEED=]
+	@$(RUN) -m openecho.study.enhancement $(if $(SEED),--seed '$(SEED)')
+
+bench: $(VENV)/.bench ## speed and precision of the Gaussian fit beside gdecomp and curve_fit, on one core [SEED=] [QUICK=1]
+	@$(RUN) -m openecho.study.bench $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(QUICK)),--quick)
+
 scale: $(READY) ## speed and memory on a large granule, interrupted, resumed and in two processes [SEED=]
 	@$(RUN) -m openecho.study.scale $(if $(SEED),--seed '$(SEED)')
 
@@ -91,4 +98,9 @@ $(READY): pyproject.toml
 # The open synthesis tools, only where they are wanted.
 $(VENV)/.synth: $(READY)
 	@$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[synth]'
+	@touch $@
+
+# What the fits are compared with is built from source.
+$(VENV)/.bench: $(READY)
+	@$(RUN) -m pip install --quiet --disable-pip-version-check --editable '.[bench]'
 	@touch $@

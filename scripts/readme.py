@@ -16,8 +16,10 @@ from openecho.study import comparison
 
 README = ROOT / "README.md"
 PICTURE = ROOT / "docs" / "core.png"
-MAKERS = ("make sim", "make precision", "make synth CLOCK=1", "make score DATA=gedi_cerrado.npz")
+MAKERS = ("make sim", "make precision", "make synth CLOCK=1", "make score DATA=gedi_cerrado.npz", "make bench")
 """What makes the reports."""
+WAVEFORMS = 1000
+"""A point, of the benchmark whose figures are worth printing."""
 
 
 def main() -> int:
@@ -199,21 +201,37 @@ def columns(_: dict[str, Any]) -> list[str]:
     """Columns of a table of echoes."""
     needs = {"": "always", "bin_ns": "sample interval", "geolocation": "positions", "time": "times of shots"}
     needs |= {"shot": "numbers of shots", "beam": "several beams"}
+    needs |= {"core": "(method inflection)", "fit": "(methods that fit)"}
     rows = [f"| `{column.name}` | {column.unit} | {column.meaning} | {needs[column.needs]} |" for column in COLUMNS]
     return ["| column | unit | | where the file has |", "| --- | --- | --- | --- |", *rows]
 
 
 def recall(content: dict[str, Any]) -> list[str]:
     """What each tap set finds of the modes of GEDI's six settings, and how many echoes they know nothing of."""
-    names = [row["name"] for row in content["taps"]["paper"]["references"] if row["name"] != "g1"]
-    if names != [f"a{setting}" for setting in range(1, 7)] or list(content["taps"]) != list(TAP_SETS):
-        raise ValueError(f"score.json has references {', '.join(names)}: run {MAKERS[-1]}")
+    names = [row["name"] for row in content["methods"]["paper"]["references"] if row["name"] != "g1"]
+    if names != [f"a{setting}" for setting in range(1, 7)] or list(content["methods"]) != list(TAP_SETS):
+        raise ValueError(f"score.json has references {', '.join(names)}: run {MAKERS[3]}")
     rows = []
-    for taps, result in content["taps"].items():
+    for taps, result in content["methods"].items():
         found = {row["name"]: row for row in result["references"]}
         cells = [f"{found[name]['within_1']:.1%}, {found[name]['spurious_per_waveform']:.2f}" for name in names]
         rows.append((f"`{taps}`", *cells))
     return table(("taps", *names), rows)
+
+
+def fits(content: dict[str, Any]) -> list[str]:
+    """What each method finds of two equal echoes, and how precisely."""
+    rows = [row for row in content["rows"] if row["grid"] == "separation"]
+    if content["waveforms"] < WAVEFORMS:
+        raise ValueError(f"bench.json has {content['waveforms']} waveforms a point: run {MAKERS[4]} without QUICK")
+    shown = [row for row in rows if row["value"] in (1.25, 1.5, 2, 2.2, 2.5, 3, 4, 6)]
+    head = ("method", *(f"{row['value']:g} σ" for row in shown))
+    return table(head, ((f"{name}", *(_found(row["methods"][name]) for row in shown)) for name in shown[0]["methods"]))
+
+
+def _found(result: dict[str, Any]) -> str:
+    """Share of waveforms with both echoes, and error of the centre in multiples of its bound."""
+    return f"{result['found']:.0%}" + (f", {result['centre']:.2f}" if result["found"] > 0.5 else "")
 
 
 PARTS: dict[str, tuple[str | None, Callable[[dict[str, Any]], list[str]]]] = {
@@ -223,6 +241,7 @@ PARTS: dict[str, tuple[str | None, Callable[[dict[str, Any]], list[str]]]] = {
     "precision": ("precision", precision),
     "columns": (None, columns),
     "recall": ("score", recall),
+    "fits": ("bench", fits),
     "differences": ("core_vs_float64", differences),
     "echoes": ("core_vs_float64", echoes),
 }

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
+from click.core import ParameterSource
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
 from openecho import __version__, batch, formats, report, tables
-from openecho.decompose import ENGINES, EngineError, configure, tabulate
+from openecho.decompose import CRITERIA, ENGINES, METHODS, STARTS, WIDTHS, EngineError, Method, prepare
+from openecho.decompose.inflection import Inflection
 from openecho.formats.recording import check_bits
 from openecho.formats.survey import lines
 from openecho.golden import ARITHMETICS, TAP_SETS, Config
@@ -52,48 +55,143 @@ def openecho() -> None:
     """
 
 
-def settings(command: Callable[..., None]) -> Callable[..., None]:
-    """Options of whatever decomposes: what the core is built with and set to, as `configure` takes it."""
-    options = [
-        click.option("--arith", "arithmetic", type=click.Choice(list(ARITHMETICS)), default="fixed", show_default=True),
-        click.option("--sample-w", type=int, default=Config.sample_w, show_default=True, help="Bits of the digitiser."),
-        click.option("--n", type=float, default=Config.n, show_default=True, help="Divisor of the width, Eq (7)."),
-        click.option(
-            "--min-interval",
-            type=int,
-            default=Config.min_interval,
-            show_default=True,
-            help="Bins that the inflections of an echo are further apart than.",
-        ),
-        click.option(
-            "--min-amplitude",
-            type=int,
-            default=Config.min_amplitude,
-            show_default=True,
-            help="Least amplitude of an echo, counts.",
-        ),
-        click.option(
-            "--k",
-            type=float,
-            default=Config.k,
-            show_default=True,
-            help="Least amplitude of an echo, deviations of the noise.",
-        ),
-    ]
-    for option in reversed(options):
-        command = option(command)
-    return command
+def numbers(_: click.Context, __: click.Parameter, text: str | None) -> tuple[float, ...] | None:
+    """Numbers with commas between them."""
+    try:
+        return None if text is None else tuple(float(number) for number in text.split(","))
+    except ValueError as error:
+        raise click.BadParameter(f"found {text!r}, expected numbers with commas between them") from error
 
 
-TAPS = click.option(
-    "--taps", type=click.Choice(list(TAP_SETS)), default="paper", show_default=True, help="Filter of the core."
-)
-ENGINE = click.option(
-    "--engine",
-    type=click.Choice(list(ENGINES)),
-    default="model",
+def recorded_pulse(_: click.Context, __: click.Parameter, path: Path | None) -> tuple[float, ...] | None:
+    """Transmitted pulse, the mean if there are several, out of an .npy file."""
+    if path is None:
+        return None
+    try:
+        pulse = np.load(path, allow_pickle=False)
+    except ValueError as error:
+        raise click.BadParameter(f"{path}: found no .npy file, expected one") from error
+    if not isinstance(pulse, np.ndarray) or pulse.ndim not in (1, 2) or pulse.dtype.kind not in "iuf":
+        raise click.BadParameter(f"{path}: found no array of one or two dimensions, expected a pulse, or one a row")
+    return tuple(np.atleast_2d(pulse).mean(axis=0).tolist())
+
+
+CORE = {
+    "engine": click.option(
+        "--engine",
+        type=click.Choice(list(ENGINES)),
+        default="model",
+        show_default=True,
+        help="The golden model, or the RTL in simulation (in a checkout): the same bits.",
+    ),
+    "taps": click.option(
+        "--taps", type=click.Choice(list(TAP_SETS)), default="paper", show_default=True, help="Filter of the core."
+    ),
+    "arithmetic": click.option(
+        "--arith", "arithmetic", type=click.Choice(list(ARITHMETICS)), default="fixed", show_default=True
+    ),
+    "sample_w": click.option(
+        "--sample-w", type=int, default=Config.sample_w, show_default=True, help="Bits of the digitiser."
+    ),
+    "n": click.option("--n", type=float, default=Config.n, show_default=True, help="Divisor of the width, Eq (7)."),
+    "min_interval": click.option(
+        "--min-interval",
+        type=int,
+        default=Config.min_interval,
+        show_default=True,
+        help="Bins that the inflections of an echo are further apart than.",
+    ),
+    "min_amplitude": click.option(
+        "--min-amplitude",
+        type=int,
+        default=Config.min_amplitude,
+        show_default=True,
+        help="Least amplitude of an echo, counts.",
+    ),
+    "k": click.option(
+        "--k",
+        type=float,
+        default=Config.k,
+        show_default=True,
+        help="Least amplitude of an echo, deviations of the noise.",
+    ),
+}
+"""Settings of the method inflection: what the core is built with and set to, as `configure` takes it."""
+
+FIT = {
+    "width": click.option(
+        "--width", type=float, default=5.0, show_default=True, help="σ of a usual echo, bins; √2 τ of a laser's."
+    ),
+    "widths": click.option("--widths", type=click.Choice(WIDTHS), default="free", show_default=True),
+    "most": click.option("--most", type=click.IntRange(0), default=16, show_default=True, help="Echoes of a waveform."),
+    "least": click.option(
+        "--least",
+        type=float,
+        default=4.0,
+        show_default=True,
+        help="Height that is worth an echo's trial, deviations of the noise behind a matched filter.",
+    ),
+    "criterion": click.option(
+        "--criterion",
+        type=click.Choice(list(CRITERIA)),
+        default="ebic",
+        show_default=True,
+        help="By which an echo has to pay.",
+    ),
+    "start": click.option(
+        "--start", type=click.Choice(STARTS), default="inflection", show_default=True, help="First guess of the echoes."
+    ),
+    "noise": click.option("--noise", type=float, help="Deviation of the noise, counts.  [default: measured]"),
+    "correlation": click.option(
+        "--correlation",
+        metavar="1,R1,R2,…",
+        callback=numbers,
+        help="Autocorrelation of the noise from lag 0 on.  [default: white]",
+    ),
+    "misfit": click.option(
+        "--misfit",
+        type=float,
+        default=0.0,
+        show_default=True,
+        help="Share of its height that a waveform may differ by from a sum of such shapes; 0.01 for most recordings.",
+    ),
+    "saturation": click.option(
+        "--saturation", type=float, help="Counts from which on the digitiser clips: such samples have no say."
+    ),
+    "epsilon": click.option("--epsilon", type=float, help="Of Vondrák's smoothing, method vl.  [default: by --width]"),
+    "rough": click.option(
+        "--rough", is_flag=True, help="Convolve the laser template, of this --width, with the height of rough targets."
+    ),
+    "transmitted": click.option(
+        "--pulse",
+        "transmitted",
+        type=click.Path(exists=True, dir_okay=False, path_type=Path),
+        callback=recorded_pulse,
+        help="Take this transmitted pulse for the laser template: .npy, counts, one sample a bin.",
+    ),
+}
+"""Settings of the methods that fit, as `openecho.decompose.fitting.Fitting` takes them."""
+
+
+def settings(*without: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Options of all methods, but for some."""
+    options = [option for name, option in {**CORE, **FIT}.items() if name not in without]
+
+    def decorated(command: Callable[..., None]) -> Callable[..., None]:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorated
+
+
+METHOD = click.option(
+    "--method",
+    type=click.Choice(METHODS),
+    default="inflection",
     show_default=True,
-    help="The golden model, or the RTL in simulation (in a checkout): the same bits.",
+    help="As the core does it; or by least squares, with Gaussians, with the laser template, or with that and first "
+    "guesses behind Vondrák's smoothing.",
 )
 
 
@@ -122,16 +220,15 @@ def info(file: Path) -> None:
     required=True,
     help=f"Table of echoes to write: {', '.join(tables.WRITERS)}.",
 )
-@ENGINE
-@TAPS
-@settings
+@METHOD
+@settings()
 @click.option("--bin-ns", type=click.FloatRange(0, min_open=True), help="Sample interval where FILE doesn't tell it.")
 @click.option("--jobs", type=click.IntRange(1), help="Processes on this machine.  [default: all that pay]")
 @click.option("--scheduler", metavar="ADDRESS", help="Hand the blocks to this Dask cluster, as tcp://host:8786.")
 def decompose(
     file: Path,
     output: Path,
-    engine: str,
+    method: str,
     bin_ns: float | None,
     jobs: int | None,
     scheduler: str | None,
@@ -142,10 +239,11 @@ def decompose(
     Memory stays bounded for files of any size. An interrupted run goes on where it was when the same command is given
     again; the result appears when it is complete.
     """
-    _check(**chosen)
+    given = _given(method, chosen)
+    _prepare(method, 0, given)
     if jobs is not None and scheduler is not None:
         raise click.UsageError("found --jobs and --scheduler, expected one of them: a cluster has its own workers")
-    job = batch.Job(file, output, engine, bin_ns, chosen, jobs, scheduler)
+    job = batch.Job(file, output, method, bin_ns, given, jobs, scheduler)
     try:
         with progress("waveforms") as advance:
             result = batch.decompose_file(job, advance)
@@ -171,18 +269,18 @@ def decompose(
     callback=in_folder,
     help="Picture to write: .png, .svg, .pdf.  [default: a window]",
 )
-@ENGINE
-@TAPS
-@settings
-def plot(file: Path, waveform: int, output: Path | None, engine: str, **chosen: Any) -> None:
-    """Draw one waveform of FILE: raw, filtered, echoes, their sum, and what they leave."""
+@METHOD
+@settings()
+def plot(file: Path, waveform: int, output: Path | None, method: str, **chosen: Any) -> None:
+    """Draw one waveform of FILE: raw, echoes, their sum, what they leave, and how the core found them."""
     with formats.open(file) as recording:
         if waveform >= recording.waveforms:
             raise click.UsageError(f"--waveform {waveform}: expected 0 to {recording.waveforms - 1}, those of {file}")
         block = recording.read(waveform, 1)
-        config = _check(longest=recording.longest, **chosen)
-        check_bits(recording.path, block, config.sample_w)
-        found = tabulate(ENGINES[engine](block.samples, block.length, config), config, recording.bin_ns)
+        ready = _prepare(method, recording.longest, _given(method, chosen))
+        check_bits(recording.path, block, ready.sample_w)
+        found = ready(block.samples, block.length, recording.bin_ns)
+        config = ready.config if isinstance(ready, Inflection) else None
         title = f"{file.name}, waveform {waveform}"
         drawn = figure.draw(found, block.samples, block.length, config, {title: 0}, recording.bin_ns)
     if output is None:
@@ -203,13 +301,26 @@ def plot(file: Path, waveform: int, output: Path | None, engine: str, **chosen: 
     default=list(TAP_SETS),
     help="Filter of the core; may be given again.  [default: all]",
 )
-@ENGINE
-@settings
+@click.option(
+    "--method",
+    "methods",
+    type=click.Choice(METHODS),
+    multiple=True,
+    default=["inflection"],
+    show_default=True,
+    help="May be given again.",
+)
+@settings("taps")
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path), callback=in_folder, help="Also write the figures as JSON."
 )
 def score(
-    file: Path, reference: Path | None, tap_sets: tuple[str, ...], engine: str, output: Path | None, **chosen: Any
+    file: Path,
+    reference: Path | None,
+    tap_sets: tuple[str, ...],
+    methods: tuple[str, ...],
+    output: Path | None,
+    **chosen: Any,
 ) -> None:
     """Judge the echoes of FILE by what others found in it, and by the waveforms themselves.
 
@@ -217,26 +328,41 @@ def score(
     an echo's peak is within 1 and 3 bins of, echoes that they have nothing near, and the ground. Without any, and
     beside them: RMSE and R² of the sum of echoes, and what it leaves.
     """
+    given = {method: _given(method, chosen, *methods) for method in methods}
+    trials = [(name, method, chosen) for method, chosen in given.items() if method != "inflection" for name in [method]]
+    if "inflection" in given:
+        trials = [(taps, "inflection", {"taps": taps, **given["inflection"]}) for taps in tap_sets] + trials
     results = {}
     with formats.open(file) as recording, progress("waveforms") as advance:
         references = formats.references(recording, reference)
-        for taps in tap_sets:
-            config = _check(longest=recording.longest, taps=taps, **chosen)
-            told = partial(_tell, advance, f"taps {taps}", recording.waveforms)
-            results[taps] = judge.score(recording, references, config, engine, told)
+        for name, method, own in trials:
+            ready = _prepare(method, recording.longest, own)
+            told = partial(_tell, advance, name, recording.waveforms)
+            results[name] = judge.score(recording, references, ready, told)
     console = Console(highlight=False)
     for table in judge.tables(results):
         console.print(table)
     if output is not None:
-        content = {"tools": report.tools("numpy"), "source": file.name, "engine": engine, **chosen, "taps": results}
+        content = {"tools": report.tools("numpy"), "source": file.name, "settings": given, "methods": results}
         report.save(output, content)
 
 
-def _check(**chosen: Any) -> Config:
-    """Core with these settings; a wrong one is a matter of usage."""
+def _given(method: str, chosen: Mapping[str, Any], *others: str) -> dict[str, Any]:
+    """What was chosen for a method; whatever belongs to none of those that run is a matter of usage."""
+    context = click.get_current_context()
+    own = CORE if method == "inflection" else FIT
+    wanted = {name for other in (method, *others) for name in (CORE if other == "inflection" else FIT)}
+    for name, value in chosen.items():
+        if name not in wanted and context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+            raise click.UsageError(f"found {name} {value}, expected only options of method {method}")
+    return {name: value for name, value in chosen.items() if name in own and value is not None}
+
+
+def _prepare(method: str, longest: int, given: Mapping[str, Any]) -> Method:
+    """Take a method with its settings; a wrong one is a matter of usage."""
     try:
-        return configure(**chosen)
-    except ValueError as error:
+        return prepare(method, longest, given)
+    except (ValueError, ModuleNotFoundError) as error:
         raise click.UsageError(str(error)) from error
 
 

@@ -101,6 +101,66 @@ def test_every_engine_and_option_reaches_the_core(run: Run, source: Path) -> Non
             np.testing.assert_array_equal(found[name], expected[name], err_msg=name)
 
 
+@pytest.mark.parametrize("method", ["gaussian", "laser", "vl"])
+def test_a_method_that_fits_writes_what_the_function_returns(method: str, run: Run, source: Path) -> None:
+    output = source.with_name("e.npz")
+    chosen = ["--method", method, "--width", "8", "--most", "4", "--misfit", "0.02", "--noise", "1.5"]
+    status, out, _ = run("decompose", source, "-o", output, *chosen, "--correlation", "1,0.25")
+    assert (status, out.splitlines()[-1][: len(str(output))]) == (0, str(output))
+    from openecho.decompose import decompose
+
+    made = stimulus.reference_set()
+    expected = decompose(
+        made.samples,
+        made.length,
+        method=method,
+        bin_ns=1.0,
+        width=8.0,
+        most=4,
+        misfit=0.02,
+        noise=1.5,
+        correlation=(1, 0.25),
+    ).echoes
+    with np.load(output) as found:
+        assert {"centre_error", "width_error", "amplitude_error"} < set(found)
+        assert "corrected_width" not in found
+        for name in expected.dtype.names or ():
+            np.testing.assert_array_equal(found[name], expected[name], err_msg=name)
+
+
+def test_a_recorded_pulse_is_the_template(run: Run, tmp_path: Path) -> None:
+    x = np.arange(300.0)
+    pulse = 300 * np.exp(-((x[:60] - 20) ** 2) / 18) + 150 * np.exp(-((x[:60] - 26) ** 2) / 50)
+    echo = 80 + sum(0.5 * np.interp(x - shift, x[:60], pulse, right=0.0) for shift in (60, 180))
+    np.save(tmp_path / "tx.npy", np.stack([pulse, pulse]))
+    np.savez(tmp_path / "a.npz", samples=np.rint(echo)[None].astype(np.uint16), length=np.array([300]))
+    chosen = ["--method", "laser", "--pulse", tmp_path / "tx.npy", "--misfit", "0.01"]
+    status, out, err = run("decompose", tmp_path / "a.npz", "-o", tmp_path / "e.npz", *chosen)
+    assert (status, out, err) == (0, f"{tmp_path}/e.npz: 2 echoes of 1 waveforms\n", "")
+    with np.load(tmp_path / "e.npz") as found:
+        np.testing.assert_allclose(np.diff(found["peak"]), 120, atol=0.01)
+
+
+@pytest.mark.parametrize("method", ["gaussian", "laser", "vl"])
+def test_plot_draws_what_was_fitted(method: str, run: Run, source: Path) -> None:
+    output = source.with_name("waveform.svg")
+    status, out, _ = run("plot", source, "--waveform", "3", "--method", method, "--width", "8", "-o", output)
+    assert (status, out.split(":")[0]) == (0, str(output))
+    assert "<svg" in output.read_text()
+
+
+def test_score_puts_methods_beside_one_another(run: Run, source: Path) -> None:
+    output = source.with_name("score.json")
+    chosen = ["--method", "inflection", "--method", "gaussian", "--taps", "gedi", "--width", "8"]
+    status, out, _ = run("score", source, *chosen, "-o", output)
+    assert status == 0
+    written = json.loads(output.read_text())
+    assert list(written["methods"]) == ["gedi", "gaussian"]
+    rmse = {name: result["rmse"]["50"] for name, result in written["methods"].items()}
+    assert rmse["gaussian"] < rmse["gedi"]
+    assert f"{rmse['gaussian']:.2f}" in out
+
+
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [
@@ -118,6 +178,30 @@ def test_every_engine_and_option_reaches_the_core(run: Run, source: Path) -> Non
             ["samples of waveform 0 sample ", ", expected 0 to 255"],
         ),
         (["decompose", "{source}", "-o", "{folder}/e.csv", "--jobs", "0"], ["--jobs", "x>=1"]),
+        (
+            ["decompose", "{source}", "-o", "{folder}/e.csv", "--method", "gaussian", "--taps", "gedi"],
+            ["found taps gedi, expected only options of method gaussian"],
+        ),
+        (
+            ["decompose", "{source}", "-o", "{folder}/e.csv", "--misfit", "0.1"],
+            ["found misfit 0.1, expected only options of method inflection"],
+        ),
+        (
+            ["decompose", "{source}", "-o", "{folder}/e.csv", "--method", "laser", "--epsilon", "1"],
+            ["epsilon: found 1.0, expected it with method vl alone"],
+        ),
+        (
+            ["plot", "{source}", "--waveform", "1", "--method", "vl", "--correlation", "1,x"],
+            ["--correlation", "found '1,x', expected numbers with commas between them"],
+        ),
+        (
+            ["plot", "{source}", "--waveform", "1", "--method", "vl", "--correlation", "1,2"],
+            ["correlation: found one that is not 1 at lag 0 and -1 to 1 elsewhere"],
+        ),
+        (
+            ["score", "{source}", "--method", "laser", "--pulse", "{source}"],
+            ["--pulse", "found no array of one or two dimensions"],
+        ),
         (["decompose", "{source}", "-o", "{folder}/e.csv", "--bin-ns", "0"], ["--bin-ns", "x>0"]),
         (
             ["decompose", "{source}", "-o", "{folder}/e.csv", "--jobs", "2", "--scheduler", "x"],
@@ -168,9 +252,9 @@ def test_score_prints_every_tap_set_and_writes_what_it_prints(run: Run, source: 
     status, out, _ = run("score", source, "--taps", "gedi", "--taps", "paper", "-o", output)
     assert status == 0
     written = json.loads(output.read_text())
-    assert list(written["taps"]) == ["gedi", "paper"]
-    assert written["taps"]["paper"]["echoes"] == 120
-    assert f"{written['taps']['gedi']['residual']['mean']:.2f}" in out
+    assert list(written["methods"]) == ["gedi", "paper"]
+    assert written["methods"]["paper"]["echoes"] == 120
+    assert f"{written['methods']['gedi']['residual']['mean']:.2f}" in out
 
 
 def test_a_full_disk_is_told_in_one_line_and_leaves_no_result(tmp_path: Path) -> None:

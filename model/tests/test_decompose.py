@@ -17,6 +17,7 @@ import openecho
 from openecho import golden, stimulus
 from openecho.batch.decompose import decompose_block
 from openecho.decompose import Decomposition, configure, decompose, dtype, tabulate, troubles
+from openecho.decompose.inflection import Inflection
 from openecho.formats import Block, Geolocation
 from openecho.golden import ARITHMETICS, NO_NOISE, PAPER_TAPS, TAP_SETS, TOO_LONG, TOO_SHORT, Config
 
@@ -84,7 +85,7 @@ def test_every_setting_is_the_golden_models(settings: dict[str, Any]) -> None:
 @pytest.mark.parametrize("arithmetic", ["fixed", "float64"])
 def test_derived_columns_are_as_defined(arithmetic: str, taps: str) -> None:
     echoes = decompose(REFERENCE.samples, REFERENCE.length, arithmetic=arithmetic, taps=taps).echoes
-    assert echoes.dtype == dtype(())
+    assert echoes.dtype == dtype(["core"])
     fwhm = 2 * math.sqrt(2 * math.log(2))
     np.testing.assert_array_equal(echoes["fwhm"], fwhm * echoes["width"])
     # Eq (9), in the core with a divider or shifts that are 1.2e-7 off, and rounded.
@@ -110,7 +111,7 @@ def test_an_echo_narrower_than_the_filter_has_no_corrected_width() -> None:
 def test_nanoseconds_are_bins_times_the_interval(bin_ns: float) -> None:
     found = decompose(REFERENCE.samples, REFERENCE.length, bin_ns=bin_ns)
     without = decompose(REFERENCE.samples, REFERENCE.length)
-    assert found.echoes.dtype == dtype(["bin_ns"])
+    assert found.echoes.dtype == dtype(["core", "bin_ns"])
     for name in ("centre", "peak", "time"):
         np.testing.assert_array_equal(found.echoes[f"{name}_ns"], found.echoes[name] * bin_ns)
     for name in without.echoes.dtype.names or ():
@@ -144,7 +145,7 @@ def test_waveforms_without_echoes_have_their_noise(arithmetic: str) -> None:
     assert found.echoes["number"].tolist() == [0, 1]
     none = decompose(flat(300), arithmetic=arithmetic, bin_ns=1.0)
     assert none.echoes.shape == (0,)
-    assert none.echoes.dtype == dtype(["bin_ns"])
+    assert none.echoes.dtype == dtype(["core", "bin_ns"])
     assert none.waveforms.tolist() == [(300, 0, 20, 1, 0)]
 
 
@@ -272,8 +273,8 @@ def test_an_echo_lies_on_the_line_from_the_first_to_the_last_bin() -> None:
     first = np.array([[1000, -10, 5000], [0, 0, 0], [20, 359.5, 300], [-8, 16, 2.5]], float)
     last = np.array([[1256, -522, 3976], [9, 9, 9], [20, 360.5, 236], [504, 16, -61.5]], float)
     block = block_of(ROWS, geolocation=Geolocation(first, last))
-    echoes = decompose_block(block, ["geolocation"], Config(), None, "model").echoes
-    assert echoes.dtype == dtype(["geolocation"])
+    echoes = decompose_block(block, ["core", "geolocation"], Inflection(Config()), None).echoes
+    assert echoes.dtype == dtype(["core", "geolocation"])
     assert echoes["peak"].tolist() == [100, 80, 128, 200]
     assert echoes["x"].tolist() == [1100, 20, 248, 392]
     assert echoes["y"].tolist() == [-210, 360.125, 16, 16]
@@ -284,7 +285,7 @@ def test_an_echo_is_where_its_peak_is_and_not_its_centre() -> None:
     samples = REFERENCE.samples[20:, :513]
     where = Geolocation(np.zeros((20, 3)), np.tile([512.0, -1024.0, 2048.0], (20, 1)))
     block = Block(0, samples, np.full(20, 513, np.int32), geolocation=where)
-    echoes = decompose_block(block, ["geolocation"], Config(), None, "model").echoes
+    echoes = decompose_block(block, ["core", "geolocation"], Inflection(Config()), None).echoes
     assert (echoes["peak"] != echoes["centre"]).all()
     for name, slope in (("x", 1), ("y", -2), ("z", 4)):
         np.testing.assert_array_equal(echoes[name], slope * echoes["peak"])
@@ -294,13 +295,13 @@ def test_an_echo_without_a_located_waveform_has_no_position() -> None:
     first, last = np.zeros((4, 3)), np.full((4, 3), 256.0)
     first[0, 1], last[2] = np.nan, np.nan
     block = block_of(ROWS, geolocation=Geolocation(first, last))
-    echoes = decompose_block(block, ["geolocation"], Config(), None, "model").echoes
+    echoes = decompose_block(block, ["core", "geolocation"], Inflection(Config()), None).echoes
     np.testing.assert_array_equal(echoes["x"], [100, np.nan, 128, 200])
     np.testing.assert_array_equal(echoes["y"], [np.nan, np.nan, 128, 200])
 
 
 def test_waveforms_are_counted_through_the_recording() -> None:
-    found = decompose_block(block_of(ROWS), (), Config(), None, "model")
+    found = decompose_block(block_of(ROWS), ["core"], Inflection(Config()), None)
     assert found.echoes["waveform"].tolist() == [1001, 1003, 1004, 1004]
     assert found.echoes["number"].tolist() == [0, 0, 0, 1]
     assert found.waveforms.tolist() == [(257, 1, 20, 0, 0), (257, 0, 20, 1, 0), (129, 1, 20, 0, 0), (257, 2, 20, 0, 0)]
@@ -309,8 +310,8 @@ def test_waveforms_are_counted_through_the_recording() -> None:
 def test_time_shot_and_beam_are_those_of_the_echos_waveform() -> None:
     time, shot = np.array([0.1, 0.2, np.nan, 0.4]), np.array([2**63 + 5, 6, 2**64 - 1, 0], np.uint64)
     block = block_of(ROWS, time=time, shot=shot, beam="BEAM1011")
-    known = ("time", "shot", "beam")
-    echoes = decompose_block(block, known, Config(), None, "model").echoes
+    known = ("core", "time", "shot", "beam")
+    echoes = decompose_block(block, known, Inflection(Config()), None).echoes
     assert echoes.dtype == dtype(known)
     np.testing.assert_array_equal(echoes["shot_time"], [0.1, np.nan, 0.4, 0.4])
     assert echoes["shot"].tolist() == [2**63 + 5, 2**64 - 1, 0, 0]
@@ -320,15 +321,15 @@ def test_time_shot_and_beam_are_those_of_the_echos_waveform() -> None:
 def test_a_block_adds_no_column_that_the_recording_does_not_tell() -> None:
     where = Geolocation(np.zeros((4, 3)), np.ones((4, 3)))
     block = block_of(ROWS, time=np.zeros(4), shot=np.ones(4, np.uint64), beam="one", geolocation=where)
-    assert decompose_block(block, (), Config(), None, "model").echoes.dtype == dtype(())
-    assert decompose_block(block, ("beam",), Config(), None, "model").echoes.dtype == dtype(["beam"])
+    assert decompose_block(block, ["core"], Inflection(Config()), None).echoes.dtype == dtype(["core"])
+    assert decompose_block(block, ["core", "beam"], Inflection(Config()), None).echoes.dtype == dtype(["core", "beam"])
 
 
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 def test_a_block_has_the_echoes_of_its_arrays(arithmetic: str) -> None:
     config = configure(1024, arithmetic=arithmetic, taps="lvis")
     block = Block(7, REFERENCE.samples, REFERENCE.length)
-    found = decompose_block(block, ["bin_ns"], config, 0.5, "model")
+    found = decompose_block(block, ["core", "bin_ns"], Inflection(config), 0.5)
     expected = decompose(REFERENCE.samples, REFERENCE.length, bin_ns=0.5, arithmetic=arithmetic, taps="lvis")
     expected.echoes["waveform"] += 7
     assert_same(found, expected)

@@ -14,6 +14,7 @@ from rich.console import Console
 
 from openecho import formats, golden
 from openecho.decompose import ENGINES, configure, criteria, decompose
+from openecho.decompose.inflection import Inflection
 from openecho.formats import Reference
 from openecho.golden import NO_PEAK
 from openecho.study.score import score, tables
@@ -53,7 +54,7 @@ def scored(
     monkeypatch.setitem(ENGINES, "made", made)
     monkeypatch.setattr(formats.recording, "BLOCK", 400)
     with recording(path, np.full((len(echoes), 200), 20), bin_ns=bin_ns) as opened:
-        result = score(opened, references, CONFIG, "made")
+        result = score(opened, references, Inflection(CONFIG, "made"))
     json.dumps(result, allow_nan=False)
     return result
 
@@ -176,7 +177,7 @@ def test_fit_is_that_of_the_sum_of_the_echoes(tmp_path: Path) -> None:
     length[3] = 250
     np.savez(tmp_path / "a.npz", samples=samples, length=length)
     with formats.open(tmp_path / "a.npz") as opened:
-        result = score(opened, (), CONFIG)
+        result = score(opened, (), Inflection(CONFIG))
     found = decompose(samples, length)
     fit = criteria.fitted(found.echoes, found.waveforms["noise_mean"], 300)
     rows = [(row - one)[:n] for row, one, n in zip(samples, fit, length, strict=True)]
@@ -203,7 +204,7 @@ def test_blocks_change_nothing_and_are_told_of(tmp_path: Path, monkeypatch: pyte
         monkeypatch.setattr(formats.recording, "BLOCK", size)
         with recording(tmp_path, samples) as opened:
             blocks: list[int] = []
-            results.append(score(opened, [modes], CONFIG, advance=blocks.append))
+            results.append(score(opened, [modes], Inflection(CONFIG), advance=blocks.append))
             told.append(blocks)
     assert told == [[12], [5, 10, 12]]
     whole, parts = results
@@ -216,7 +217,7 @@ def test_blocks_change_nothing_and_are_told_of(tmp_path: Path, monkeypatch: pyte
 
 def test_metres_need_a_sample_interval(tmp_path: Path) -> None:
     with recording(tmp_path, scene(seed=4)) as opened:
-        (row,) = score(opened, [reference([[90]] * 12)], CONFIG)["references"]
+        (row,) = score(opened, [reference([[90]] * 12)], Inflection(CONFIG))["references"]
     assert not any(name.endswith("_m") for name in row)
 
 
@@ -227,7 +228,7 @@ def test_counts_that_the_core_has_no_bits_for_are_refused(tmp_path: Path) -> Non
         recording(tmp_path, samples) as opened,
         pytest.raises(formats.DataError, match="samples of waveform 2 sample 7 is 2048, expected 0 to 2047"),
     ):
-        score(opened, (), CONFIG)
+        score(opened, (), Inflection(CONFIG))
 
 
 def printed(results: dict[str, dict[str, Any]]) -> list[list[str]]:
@@ -255,14 +256,14 @@ def test_tables_have_a_row_for_each_reference_and_each_tap_set(tmp_path: Path, m
 
 def test_without_references_there_is_the_table_of_the_fit_alone(tmp_path: Path) -> None:
     with recording(tmp_path, scene(seed=5)) as opened:
-        (table,) = tables({"paper": score(opened, (), CONFIG)})
-    assert [column.header for column in table.columns][:3] == ["taps", "echoes/\nwaveform", "RMSE"]
+        (table,) = tables({"paper": score(opened, (), Inflection(CONFIG))})
+    assert [column.header for column in table.columns][:3] == ["method", "echoes/\nwaveform", "RMSE"]
 
 
 @pytest.mark.parametrize("name", ["a1", "a4"])
 def test_recorded_gedi_modes_are_found_with_the_smoothing_they_were_made_with(name: str, recorded: Path) -> None:
     with formats.open(recorded / "gedi_cerrado.npz") as opened:
-        result = score(opened, formats.references(opened), configure(opened.longest, taps="nasa6.5"))
+        result = score(opened, formats.references(opened), Inflection(configure(opened.longest, taps="nasa6.5")))
     row = next(row for row in result["references"] if row["name"] == name)
     assert (row["waveforms"], row["modes"]) == (688, 697)
     assert row["within_1"] >= 0.99

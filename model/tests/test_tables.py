@@ -24,13 +24,15 @@ from openecho import tables
 from openecho.decompose import COLUMNS, columns, dtype
 from openecho.tables import Table, TableError
 
-KNOWN = ("bin_ns", "geolocation", "time", "shot", "beam")
+KNOWN = ("core", "fit", "bin_ns", "geolocation", "time", "shot", "beam")
 BEAMS = ("BEAM0000", "BEAM0101", "BEAM1011")
+ALWAYS = ["waveform", "number", "centre", "peak", "time", "width", "fwhm", "amplitude", "flags"]
 NAMES = [
-    *["waveform", "number", "centre", "peak", "time", "width", "fwhm", "corrected_width", "amplitude", "flags"],
+    *["waveform", "number", "centre", "peak", "time", "width", "fwhm", "corrected_width", "amplitude"],
+    *["centre_error", "width_error", "amplitude_error", "flags"],
     *["centre_ns", "peak_ns", "time_ns", "x", "y", "z", "shot_time", "shot", "beam"],
 ]
-KINDS = ["i8", "i4", *["f8"] * 7, "u1", *["f8"] * 7, "u8", "U8"]
+KINDS = ["i8", "i4", *["f8"] * 10, "u1", *["f8"] * 7, "u8", "U8"]
 LAS_HAS = ("x", "y", "z", "beam")
 """Columns that need no extra dimension in LAS."""
 
@@ -149,10 +151,10 @@ def test_names_are_unique_and_meanings_fit_las() -> None:
 def test_columns_are_those_the_recording_tells_in_one_order() -> None:
     assert [column.name for column in columns(KNOWN)] == NAMES
     assert dtype(KNOWN) == np.dtype(list(zip(NAMES, KINDS, strict=True)))
-    assert dtype(()).names == tuple(NAMES[:10])
-    assert dtype(["shot", "bin_ns"]).names == (*NAMES[:10], "centre_ns", "peak_ns", "time_ns", "shot")
-    assert dtype({"geolocation", "beam"}).names == (*NAMES[:10], "x", "y", "z", "beam")
-    assert dtype(["time"]).names == (*NAMES[:10], "shot_time")
+    assert dtype(()).names == tuple(ALWAYS)
+    assert dtype(["shot", "bin_ns"]).names == (*ALWAYS, "centre_ns", "peak_ns", "time_ns", "shot")
+    assert dtype({"geolocation", "beam"}).names == (*ALWAYS, "x", "y", "z", "beam")
+    assert dtype(["time"]).names == (*ALWAYS, "shot_time")
 
 
 @pytest.mark.parametrize("suffix", READERS)
@@ -260,7 +262,7 @@ def test_rows_are_the_same_however_many_are_converted_at_a_time(
 
 
 def test_csv_is_a_line_of_names_and_numbers_in_as_many_digits_as_they_need(tmp_path: Path) -> None:
-    echoes = np.zeros(2, dtype(["shot", "beam"]))
+    echoes = np.zeros(2, dtype(["core", "shot", "beam"]))
     echoes[0] = (7, 0, 100.5, 0.1, -0.0, 1 / 3, 1e300, np.nan, 250, 5, 2**64 - 1, "BEAM0000")
     path = tmp_path / "echoes.csv"
     tables.write(path, table_of(echoes))
@@ -282,7 +284,14 @@ def test_parquet_tells_unit_and_meaning_of_every_column(tmp_path: Path) -> None:
         assert field.metadata[b"unit"].decode() == column.unit
         assert field.metadata[b"meaning"].decode() == column.meaning
         assert not field.nullable
-    assert [field.metadata[b"unit"] for field in schema][2:12] == [*[b"bins"] * 6, b"counts", b"", b"ns", b"ns"]
+    assert [field.metadata[b"unit"] for field in schema][2:15] == [
+        *[b"bins"] * 6,
+        b"counts",
+        *[b"bins"] * 2,
+        b"counts",
+        b"",
+        *[b"ns"] * 2,
+    ]
 
 
 def test_parquet_tells_the_sample_interval_where_it_is_known(tmp_path: Path) -> None:
@@ -302,7 +311,7 @@ def test_npz_has_the_sample_interval_where_it_is_known(tmp_path: Path) -> None:
         bin_ns = archive["bin_ns"]
     assert (bin_ns.shape, bin_ns.dtype, float(bin_ns)) == ((), np.float64, 1 / 3)
     with np.load(unknown) as archive:
-        assert archive.files == NAMES[:10]
+        assert archive.files == ALWAYS
 
 
 def test_npz_is_a_sound_compressed_archive(tmp_path: Path) -> None:

@@ -10,17 +10,16 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import asdict, dataclass
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 
 from openecho import __version__, formats, tables
 from openecho.batch.distribute import run
 from openecho.batch.store import Store, open_store, written
-from openecho.decompose import ENGINES, Decomposition, configure, dtype, tabulate, troubles
+from openecho.decompose import Decomposition, Method, dtype, prepare, troubles
 from openecho.formats import Block, Recording
 from openecho.formats.recording import check_bits
-from openecho.golden import Config
 from openecho.tables import Table
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
@@ -46,12 +45,12 @@ class Job:
         Recorded waveforms.
     output : Path
         Table of echoes; its suffix names the format.
-    engine : str
-        One of `ENGINES`.
+    method : str
+        One of `openecho.decompose.METHODS`.
     bin_ns : float or None
         Sample interval in nanoseconds, for recordings that don't tell it.
     settings : dict
-        As `configure` takes them.
+        Of the method, as `openecho.decompose.prepare` takes them.
     jobs : int or None
         Processes on this machine; None: as many as finish first.
     scheduler : str or None
@@ -60,7 +59,7 @@ class Job:
 
     source: Path
     output: Path
-    engine: str
+    method: str
     bin_ns: float | None
     settings: dict[str, Any]
     jobs: int | None = None
@@ -106,19 +105,19 @@ def decompose_file(job: Job, advance: Advance = lambda doing, done, total: None)
 
     Raises
     ------
-    DataError, TableError, StoreError, EngineError, DistributionError, ValueError
+    DataError, TableError, StoreError, EngineError, DistributionError, ValueError, ModuleNotFoundError
         One line with what was found and what was expected: in the recording, of the output, of the blocks of an
         earlier run, of the engine, of the cluster, of a setting.
     OSError
         If something can't be written: disk full, no permission.
     """
     with formats.open(job.source) as recording:
-        config = configure(recording.longest, **job.settings)
+        method = prepare(job.method, recording.longest, job.settings)
         bin_ns = recording.bin_ns if job.bin_ns is None else job.bin_ns
-        known = _known(recording, bin_ns)
+        known = (*method.columns, *_known(recording, bin_ns))
         tables.check(job.output, known)
         plan = recording.plan()
-        with open_store(job.output, _description(job, recording, len(plan), config, bin_ns)) as store:
+        with open_store(job.output, _description(job, recording, len(plan), method, bin_ns)) as store:
             finished = store.finished()
             resumed = done = sum(plan[number][1] for number in finished)
             advance("decomposing", done, recording.waveforms)
@@ -126,7 +125,7 @@ def decompose_file(job: Job, advance: Advance = lambda doing, done, total: None)
             alone = processes == 1 and job.scheduler is None
             source = recording if alone else _Shared(recording.path.resolve(), recording.path.stat().st_mtime_ns)
             left = (
-                (number, (source, first, count, known, config, bin_ns, job.engine))
+                (number, (source, first, count, known, method, bin_ns))
                 for number, (first, count) in enumerate(plan)
                 if number not in finished
             )
@@ -138,28 +137,25 @@ def decompose_file(job: Job, advance: Advance = lambda doing, done, total: None)
             return _write(recording, store, len(plan), known, bin_ns, resumed)
 
 
-def decompose_block(
-    block: Block, known: Collection[str], config: Config, bin_ns: float | None, engine: str
-) -> Decomposition:
+def decompose_block(block: Block, known: Collection[str], method: Method, bin_ns: float | None) -> Decomposition:
     """Decompose a block, and add to its echoes what the recording tells of their waveforms.
 
     Parameters
     ----------
     block : Block
     known : collection of str
-        What the recording tells, of the words in `Column.needs`.
-    config : Config
+        What the recording and the method tell, of the words in `Column.needs`.
+    method : Method
+        With its settings.
     bin_ns : float or None
         Sample interval in nanoseconds.
-    engine : str
-        One of `ENGINES`.
 
     Returns
     -------
     Decomposition
         Its echoes have the columns of `known`, and `waveform` counts through the whole recording.
     """
-    found = tabulate(ENGINES[engine](block.samples, block.length, config), config, bin_ns)
+    found = method(block.samples, block.length, bin_ns)
     row = found.echoes["waveform"]
     echoes = np.zeros(len(row), dtype(known))
     for name in found.echoes.dtype.names or ():
@@ -176,7 +172,7 @@ def decompose_block(
             echoes[name] = values[row]
     if "beam" in known:
         echoes["beam"] = block.beam
-    return Decomposition(echoes, found.waveforms)
+    return Decomposition(echoes, found.waveforms, found.pulse)
 
 
 def _known(recording: Recording, bin_ns: float | None) -> tuple[str, ...]:
@@ -228,22 +224,23 @@ def _decompose_rows(
     first: int,
     count: int,
     known: Collection[str],
-    config: Config,
+    method: Method,
     bin_ns: float | None,
-    engine: str,
 ) -> Decomposition:
     """Read a block and decompose it, here or on a worker."""
     _keep_freed_memory()
     with _reading:
         recording = _opened(source) if isinstance(source, _Shared) else source
         block = recording.read(first, count)
-    check_bits(recording.path, block, config.sample_w)
-    return decompose_block(block, known, config, bin_ns, engine)
+    check_bits(recording.path, block, method.sample_w)
+    return decompose_block(block, known, method, bin_ns)
 
 
-def _description(job: Job, recording: Recording, blocks: int, config: Config, bin_ns: float | None) -> dict[str, Any]:
+def _description(job: Job, recording: Recording, blocks: int, method: Method, bin_ns: float | None) -> dict[str, Any]:
     """Everything that the blocks depend on."""
     status = recording.path.stat()
+    settings = asdict(cast(Any, method))
+    settings |= settings.pop("config", {})
     return {
         "version": __version__,
         "source": str(recording.path.resolve()),
@@ -251,8 +248,8 @@ def _description(job: Job, recording: Recording, blocks: int, config: Config, bi
         "modified": status.st_mtime_ns,
         "blocks": blocks,
         "bin_ns": bin_ns,
-        "engine": job.engine,
-        **asdict(config),
+        "method": job.method,
+        **settings,
     }
 
 

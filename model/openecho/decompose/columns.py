@@ -24,7 +24,8 @@ class Column:
     meaning : str
         A few words, at most 32 characters, for LAS has no room for more.
     needs : str
-        What a recording must tell for it: ``bin_ns``, ``geolocation``, ``time``, ``shot``, ``beam``; empty: nothing.
+        What a recording must tell for it: ``bin_ns``, ``geolocation``, ``time``, ``shot``, ``beam``; or whether it is
+        a matter of the ``core`` or of a ``fit``; empty: nothing.
     """
 
     name: str
@@ -38,12 +39,15 @@ COLUMNS = (
     Column("waveform", "i8", "", "waveform of the file, from 0"),
     Column("number", "i4", "", "echo of the waveform, from 0"),
     Column("centre", "f8", "bins", "midpoint of the inflections"),
-    Column("peak", "f8", "bins", "maximum of the filtered echo"),
+    Column("peak", "f8", "bins", "maximum of the echo"),
     Column("time", "f8", "bins", "echo time, centre - FWHM / 4"),
-    Column("width", "f8", "bins", "sigma of the filtered echo"),
-    Column("fwhm", "f8", "bins", "FWHM of the filtered echo"),
-    Column("corrected_width", "f8", "bins", "filter taken out; 0: narrower"),
+    Column("width", "f8", "bins", "sigma; core: of filtered echo"),
+    Column("fwhm", "f8", "bins", "full width at half maximum"),
+    Column("corrected_width", "f8", "bins", "filter taken out; 0: narrower", "core"),
     Column("amplitude", "f8", "counts", "height over the noise mean"),
+    Column("centre_error", "f8", "bins", "standard error", "fit"),
+    Column("width_error", "f8", "bins", "standard error", "fit"),
+    Column("amplitude_error", "f8", "counts", "standard error", "fit"),
     Column("flags", "u1", "", "1 saturated 2 truncated 4 nopeak"),
     Column("centre_ns", "f8", "ns", "centre since the first bin", "bin_ns"),
     Column("peak_ns", "f8", "ns", "peak since the first bin", "bin_ns"),

@@ -128,6 +128,56 @@ def r_squared(samples: NDArray[Any], length: NDArray[Any], fitted: NDArray[np.fl
     return 1 - unexplained
 
 
+def windowed_r_squared(
+    samples: NDArray[Any], length: NDArray[Any], fitted: NDArray[np.float64], echoes: Echoes
+) -> NDArray[np.float64]:
+    """Share of the variance at the echoes that what was fitted explains: 1 - Σ W(y - ŷ)² / Σ W(y - ȳ)².
+
+    Fan & Wang, V–L decomposition, Eqs (23) and (24), where R² of the whole record follows the noise of what lies
+    between the echoes. W is 1 between the 3 dB points of each echo and 0 elsewhere; windows that overlap are one, so
+    no sample counts twice. The print lost the equations. What its text leaves open is decided here:
+
+    - 3 dB is half of the power, and counts follow the optical power: the points are half a FWHM to either side of the
+      maximum. The laser's pulse rises sooner than it falls, but a window must not depend on the template it judges.
+    - A sample belongs to a window if it lies between the points or on one.
+    - ȳ is the mean of the whole record, as in `r_squared`. That of the windows would make the total several times
+      smaller and so lower the figure, where the paper's rises, from 0.9935 to 0.9988.
+
+    Parameters
+    ----------
+    samples, length, fitted
+        As in `rmse`.
+    echoes : Echoes (e,)
+        `waveform` (row, from 0), `peak` and `fwhm` (bins) of each echo whose surroundings count: those found, or the
+        true ones where fits are compared over the same samples.
+
+    Returns
+    -------
+    float64 (n,)
+        At most 1; nan for a constant waveform and for one without a sample in a window.
+    """
+    recorded = _recorded(samples, length)
+    mean = np.mean(samples, axis=1, where=recorded, keepdims=True)
+    inside = recorded & _windows(samples.shape, echoes)
+    total = np.sum((samples - mean) ** 2, axis=1, where=inside)
+    left = np.sum((samples - fitted) ** 2, axis=1, where=inside)
+    unexplained: NDArray[np.float64] = np.divide(left, total, out=np.full(len(total), np.nan), where=total > 0)
+    return 1 - unexplained
+
+
+def _windows(shape: tuple[int, ...], echoes: Echoes) -> NDArray[np.bool_]:
+    """Which samples (n, m) lie between the half-maximum points of an echo."""
+    n, m = shape
+    row = np.asarray(echoes["waveform"], np.int64)
+    begin = np.clip(np.ceil(echoes["peak"] - echoes["fwhm"] / 2), 0, m).astype(np.int64)
+    end = np.clip(np.floor(echoes["peak"] + echoes["fwhm"] / 2) + 1, begin, m).astype(np.int64)
+    # Windows that begin less those that end: above 0 where one or more are open.
+    change = np.zeros((n, m + 1), np.int64)
+    np.add.at(change, (row, begin), 1)
+    np.add.at(change, (row, end), -1)
+    return np.asarray(np.cumsum(change, axis=1)[:, :m] > 0)
+
+
 def _recorded(samples: NDArray[Any], length: NDArray[Any]) -> NDArray[np.bool_]:
     """Which samples (n, m) lie within the length of their row."""
     recorded: NDArray[np.bool_] = np.arange(samples.shape[1]) < length[:, np.newaxis]

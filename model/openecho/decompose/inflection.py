@@ -7,34 +7,48 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from openecho.decompose.columns import dtype
+from openecho.decompose.decomposition import WAVEFORM, Decomposition
 from openecho.decompose.engines import ENGINES
-from openecho.golden import ARITHMETICS, NO_NOISE, TAP_SETS, TOO_LONG, TOO_SHORT, Config, decode_records
+from openecho.golden import ARITHMETICS, TAP_SETS, Config, decode_records
 from openecho.golden.float64 import FWHM, corrected_width
-
-WAVEFORM = np.dtype(
-    [("length", "i4"), ("echoes", "i4"), ("noise_mean", "f8"), ("noise_deviation", "f8"), ("flags", "u1")]
-)
-"""What the core says of each waveform: samples, number of echoes, noise of the first 50 samples in counts, flags."""
 
 
 @dataclass(frozen=True)
-class Decomposition:
-    """Echoes of some waveforms.
+class Inflection:
+    """The core with its settings; called with waveforms, it decomposes them.
+
+    Bit for bit as the core does (Zhou 2022, as corrected in `golden`).
 
     Attributes
     ----------
-    echoes : structured (echoes,)
-        Columns of `columns.COLUMNS`, in the order of waveforms and of bins.
-    waveforms : structured (n,) of `WAVEFORM`
-        One entry for each waveform, also for one without echoes. Its flags: 1 too short, 2 too long and cut,
-        4 fewer than the 50 samples that measure the noise.
+    config : Config
+        What the core was built with and set to.
+    engine : str
+        One of `ENGINES`: the golden model, or the RTL itself in simulation, in a checkout of the project.
     """
 
-    echoes: np.ndarray
-    waveforms: np.ndarray
+    config: Config
+    engine: str = "model"
+
+    columns = ("core",)
+    """What its echoes have besides what all have, of the words in `Column.needs`."""
+
+    def __post_init__(self) -> None:
+        """Refuse an engine that there is not."""
+        if self.engine not in ENGINES:
+            raise ValueError(f"engine: found {self.engine!r}, expected one of {', '.join(ENGINES)}")
+
+    @property
+    def sample_w(self) -> int:
+        """Bits that a sample may have."""
+        return self.config.sample_w
+
+    def __call__(self, samples: NDArray[Any], length: NDArray[Any], bin_ns: float | None) -> Decomposition:
+        """Decompose waveforms (n, m) of so many samples (n,), counts; with nanoseconds if a bin's are known."""
+        return tabulate(ENGINES[self.engine](samples, length, self.config), self.config, bin_ns)
 
 
 def configure(
@@ -89,53 +103,6 @@ def configure(
     ).in_arithmetic(arithmetic)
 
 
-def decompose(
-    samples: ArrayLike,
-    length: ArrayLike | None = None,
-    *,
-    bin_ns: float | None = None,
-    engine: str = "model",
-    **settings: Any,
-) -> Decomposition:
-    """Find the echoes of each waveform, bit for bit as the core finds them (Zhou 2022, as corrected in `golden`).
-
-    Parameters
-    ----------
-    samples : (n, m) integer array
-        A waveform a row, counts; or (m,), one waveform.
-    length : (n,) integer array, optional
-        Samples that were recorded in each row; all m if left out.
-    bin_ns : float, optional
-        Sample interval in nanoseconds, for the columns in nanoseconds.
-    engine : str
-        ``model`` or ``rtl``: the golden model, or the RTL itself in simulation, in a checkout of the project.
-    **settings
-        As `configure` takes them: `arithmetic`, `taps`, `sample_w`, `n`, `min_interval`, `min_amplitude`, `k`.
-
-    Returns
-    -------
-    Decomposition
-
-    Raises
-    ------
-    ValueError
-        If an array or a setting is not as described.
-
-    Examples
-    --------
-    >>> found = openecho.decompose(samples, taps="gedi", bin_ns=1.0)  # doctest: +SKIP
-    >>> found.echoes["peak_ns"]  # doctest: +SKIP
-    """
-    if engine not in ENGINES:
-        raise ValueError(f"engine: found {engine!r}, expected one of {', '.join(ENGINES)}")
-    if bin_ns is not None and not 0 < bin_ns < np.inf:
-        raise ValueError(f"bin_ns: found {bin_ns}, expected a positive number")
-    rows = np.atleast_2d(np.asarray(samples))
-    lengths = np.full(len(rows), rows.shape[1]) if length is None else np.atleast_1d(np.asarray(length))
-    config = configure(rows.shape[-1], **settings)
-    return tabulate(ENGINES[engine](rows, lengths, config), config, bin_ns)
-
-
 def tabulate(records: NDArray[Any], config: Config, bin_ns: float | None) -> Decomposition:
     """Table of what the core says in its records.
 
@@ -154,7 +121,7 @@ def tabulate(records: NDArray[Any], config: Config, bin_ns: float | None) -> Dec
     """
     decoded = decode_records(records, config)
     found, trailers = decoded[~decoded["trailer"]], decoded[decoded["trailer"]]
-    echoes = np.zeros(len(found), dtype(() if bin_ns is None else ("bin_ns",)))
+    echoes = np.zeros(len(found), dtype(("core",) if bin_ns is None else ("core", "bin_ns")))
     echoes["waveform"] = found["sequence"]
     for name in ("number", "centre", "peak", "time", "width", "amplitude", "flags"):
         echoes[name] = found[name]
@@ -168,10 +135,3 @@ def tabulate(records: NDArray[Any], config: Config, bin_ns: float | None) -> Dec
     for name in ("length", "noise_mean", "noise_deviation", "flags"):
         waveforms[name] = trailers[name]
     return Decomposition(echoes, waveforms)
-
-
-def troubles(waveforms: np.ndarray) -> dict[str, int]:
-    """How many waveforms the core could not treat as any other, by what was the matter with them."""
-    names = {TOO_SHORT: "too short for the filter", TOO_LONG: "too long and cut", NO_NOISE: "too short for noise"}
-    counts = {name: int(np.count_nonzero(waveforms["flags"] & flag)) for flag, name in names.items()}
-    return {name: count for name, count in counts.items() if count}

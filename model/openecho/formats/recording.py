@@ -242,9 +242,9 @@ def check_range(path: Path, name: str, values: NDArray[Any], low: int, high: int
         raise DataError(f"{path}: {name} of {where} is {values[at]}, expected {low} to {high}")
 
 
-def check_bits(path: Path, block: Block, sample_w: int) -> None:
-    """Raise a DataError for the first sample of a block that has more than `sample_w` bits."""
-    if block.samples.max() >> sample_w:
+def check_bits(path: Path, block: Block, sample_w: int | None) -> None:
+    """Raise a DataError for the first sample of a block that has more than `sample_w` bits; None: any are fine."""
+    if sample_w is not None and block.samples.max() >> sample_w:
         check_range(path, "samples", block.samples, 0, 2**sample_w - 1, block.first)
 
 

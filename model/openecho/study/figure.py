@@ -1,4 +1,4 @@
-"""The picture of a decomposition: waveform, echoes and their sum, what they leave, and where the core found them."""
+"""The picture of a decomposition: waveform, echoes and their sum, what they leave, and how the core found them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from openecho import golden
 from openecho.decompose import Decomposition
-from openecho.decompose.criteria import component_width, fitted
 
 RAW, FILTERED, CURVATURE, FOUND, SUM = "#909090", "#1f4e79", "#5f6b3a", "#c0392b", "#e08214"
 
@@ -30,15 +29,15 @@ def draw(
     found: Decomposition,
     samples: NDArray[Any],
     length: NDArray[Any],
-    config: golden.Config,
+    config: golden.Config | None,
     rows: Mapping[str, int],
     bin_ns: float | None = None,
 ) -> Figure:
-    """Draw waveforms with the echoes that the core found in them.
+    """Draw waveforms with the echoes that were found in them.
 
-    From top to bottom: raw and filtered waveform, each echo as a Gaussian of its corrected width where its peak is, and
-    the sum of them; the raw waveform less that sum, with the noise deviation to either side; and the second difference
-    with the inflections.
+    From top to bottom: waveform, each echo, and the sum of them; the waveform less that sum, with the noise deviation
+    to either side. Of the core's own method also the filtered waveform, and the second difference with the inflections;
+    its echoes are Gaussians of their corrected widths where their peaks are.
 
     Parameters
     ----------
@@ -48,8 +47,8 @@ def draw(
         Raw waveforms, counts.
     length : integer (n,)
         Samples in each.
-    config : golden.Config
-        What the core was built with and set to.
+    config : golden.Config or None
+        What the core was built with and set to; None for echoes that were fitted.
     rows : mapping
         Title to row of `samples`; one column of the picture each.
     bin_ns : float, optional
@@ -59,30 +58,32 @@ def draw(
     -------
     Figure
     """
-    figure = Figure(figsize=(6.5 * len(rows), 8.4), layout="constrained")
-    axes = figure.subplots(3, len(rows), sharex="col", squeeze=False, height_ratios=[3, 1, 1.5])
+    heights = [3, 1] if config is None else [3, 1, 1.5]
+    figure = Figure(figsize=(6.5 * len(rows), 1.53 * sum(heights)), layout="constrained")
+    axes = figure.subplots(len(heights), len(rows), sharex="col", squeeze=False, height_ratios=heights)
     for column, (title, row) in enumerate(rows.items()):
-        waveform, residual, second = axes[:, column]
         raw = samples[row, : length[row]].astype(float)
-        echoes = found.echoes[found.echoes["waveform"] == row]
-        _waveform(waveform, raw, echoes, found.waveforms[row], config)
-        _residual(residual, raw, echoes, found.waveforms[row])
-        _second_difference(second, raw, echoes, config)
-        waveform.set_xlim(*_window(echoes, len(raw)))
-        waveform.set_title(title)
-        second.set_xlabel("bin")
+        shown = found.alone(row)
+        _waveform(axes[0, column], raw, shown)
+        _residual(axes[1, column], raw, shown)
+        if config is not None:
+            _filtered(axes[0, column], raw, config)
+            _second_difference(axes[2, column], raw, shown.echoes, config)
+        axes[0, column].set_xlim(*_window(shown.echoes, len(raw)))
+        axes[0, column].set_title(title)
+        axes[-1, column].set_xlabel("bin")
         if bin_ns is not None:
             to_ns, to_bins = (lambda x: x * bin_ns), (lambda ns: ns / bin_ns)
-            waveform.secondary_xaxis("top", functions=(to_ns, to_bins)).set_xlabel("ns")
-    for axis, label in zip(axes[:, 0], ("counts", "raw - sum, counts", "counts/bin²"), strict=True):
+            axes[0, column].secondary_xaxis("top", functions=(to_ns, to_bins)).set_xlabel("ns")
+    for axis, label in zip(axes[:, 0], ("counts", "raw - sum, counts", "counts/bin²"), strict=False):
         axis.set_ylabel(label)
     # Below all panels: within one, twenty echoes or plain noise leave no room for it.
-    shown = {
+    labels = {
         label: handle for axis in axes.flat for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
     }
     figure.legend(
-        handles=list(shown.values()),
-        labels=list(shown),
+        handles=list(labels.values()),
+        labels=list(labels),
         loc="outside lower center",
         frameon=False,
         fontsize=8,
@@ -136,38 +137,38 @@ def show(figure: Figure) -> None:
     plt.show()
 
 
-def _waveform(
-    axes: Axes, raw: NDArray[np.float64], echoes: np.ndarray, noise: np.ndarray, config: golden.Config
-) -> None:
-    """Raw and filtered waveform, each echo, and the sum of all."""
-    baseline, x = float(noise["noise_mean"]), np.arange(len(raw))
-    taps = np.array(config.taps) / sum(config.taps)
+def _waveform(axes: Axes, raw: NDArray[np.float64], found: Decomposition) -> None:
+    """Raw waveform, each echo, and the sum of all."""
+    baseline, x = float(found.waveforms["noise_mean"][0]), np.arange(len(raw))
     axes.plot(x, raw, ".", color=RAW, markersize=4, label="raw waveform")
+    for number, echo in enumerate(found.echoes):
+        near = np.abs(x - echo["peak"]) < 2 * echo["fwhm"]
+        shape = found.alone(0, number).fitted(len(raw))[0, near]
+        axes.fill_between(x[near], baseline, shape, color=FOUND, alpha=0.15, lw=0)
+        axes.plot(x[near], shape, color=FOUND, lw=0.8, alpha=0.8)
+    axes.plot([], [], color=FOUND, lw=0.9, label="echoes")
+    axes.plot(x, found.fitted(len(raw))[0], "--", color=SUM, lw=1.2, label="their sum")
+    height = baseline + found.echoes["amplitude"]
+    axes.vlines(found.echoes["centre"], baseline, height, color=FOUND, lw=0.9, ls=":", label="centre")
+    axes.plot(found.echoes["peak"], height, "v", color=FOUND, markersize=6, label="peak, amplitude")
+    axes.margins(y=0.1)
+
+
+def _filtered(axes: Axes, raw: NDArray[np.float64], config: golden.Config) -> None:
+    """Filtered waveform."""
+    taps = np.array(config.taps) / sum(config.taps)
     if len(raw) >= len(taps):
         # Only where the filter lies inside the waveform, and moved back by its group delay.
         filtered = np.convolve(raw, taps, "valid")
         axes.plot(np.arange(len(filtered)) + (len(taps) - 1) / 2, filtered, color=FILTERED, lw=1.2, label="filtered")
-    for number, width in enumerate(component_width(echoes)):
-        echo = echoes[number : number + 1]
-        near = np.abs(x - echo["peak"]) < 3.5 * width
-        shape = _sum(echo, baseline, len(raw))[near]
-        axes.fill_between(x[near], baseline, shape, color=FOUND, alpha=0.15, lw=0)
-        axes.plot(x[near], shape, color=FOUND, lw=0.8, alpha=0.8)
-    axes.plot([], [], color=FOUND, lw=0.9, label="echoes")
-    axes.plot(x, _sum(echoes, baseline, len(raw)), "--", color=SUM, lw=1.2, label="their sum")
-    height = baseline + echoes["amplitude"]
-    axes.vlines(echoes["centre"], baseline, height, color=FOUND, lw=0.9, ls=":", label="centre")
-    axes.plot(echoes["peak"], height, "v", color=FOUND, markersize=6, label="peak, amplitude")
-    axes.margins(y=0.1)
 
 
-def _residual(axes: Axes, raw: NDArray[np.float64], echoes: np.ndarray, noise: np.ndarray) -> None:
+def _residual(axes: Axes, raw: NDArray[np.float64], found: Decomposition) -> None:
     """Raw waveform less the sum of its echoes."""
-    left = raw - _sum(echoes, float(noise["noise_mean"]), len(raw))
-    deviation = float(noise["noise_deviation"])
+    deviation = float(found.waveforms["noise_deviation"][0])
     axes.axhspan(-deviation, deviation, color=FILTERED, alpha=0.15, lw=0, label="noise deviation")
     axes.axhline(0, color="black", lw=0.6)
-    axes.plot(np.arange(len(raw)), left, color=RAW, lw=1, label="residual")
+    axes.plot(np.arange(len(raw)), raw - found.fitted(len(raw))[0], color=RAW, lw=1, label="residual")
 
 
 def _second_difference(axes: Axes, raw: NDArray[np.float64], echoes: np.ndarray, config: golden.Config) -> None:
@@ -185,14 +186,6 @@ def _second_difference(axes: Axes, raw: NDArray[np.float64], echoes: np.ndarray,
     axes.plot(
         inflections, np.zeros(len(inflections)), "o", color=FOUND, markersize=5, mfc="white", label="inflection points"
     )
-
-
-def _sum(echoes: np.ndarray, baseline: float, length: int) -> NDArray[np.float64]:
-    """Sum of the echoes of one waveform on its baseline (length,), counts."""
-    alone = echoes.copy()
-    alone["waveform"] = 0
-    total: NDArray[np.float64] = fitted(alone, np.array([baseline]), length)[0]
-    return total
 
 
 def _window(echoes: np.ndarray, length: int) -> tuple[float, float]:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from rich import box
 from rich.table import Table
 
-from openecho.decompose import ENGINES, tabulate
-from openecho.decompose.criteria import fitted, r_squared, rmse
+from openecho.decompose import Method
+from openecho.decompose.criteria import r_squared, rmse
 from openecho.formats.recording import MAX_LENGTH, Recording, check_bits
 from openecho.formats.references import Reference
-from openecho.golden import NO_PEAK, Config
+from openecho.golden import NO_PEAK
 
 NEAR, FAR = 1, 3
 """Bins within which a mode counts as found precisely, and as found at all: GEDI's pulse is σ 4.6 bins wide."""
@@ -37,8 +37,7 @@ Sums = dict[str, Any]
 def score(
     recording: Recording,
     references: Sequence[Reference],
-    config: Config,
-    engine: str = "model",
+    method: Method,
     advance: Callable[[int], object] = lambda done: None,
 ) -> dict[str, Any]:
     """Decompose all waveforms of a recording, and judge their echoes.
@@ -49,10 +48,8 @@ def score(
         Open; it is read block by block.
     references : sequence of Reference
         Of this recording, as from `openecho.formats.references`.
-    config : Config
-        Core that decomposes.
-    engine : str
-        One of `openecho.decompose.ENGINES`.
+    method : Method
+        What decomposes, of `openecho.decompose.prepare`.
     advance : callable, optional
         Called with the number of waveforms that are done.
 
@@ -83,10 +80,10 @@ def score(
     misfits, shares, grounds = [], [], [[np.zeros(0)] for _ in references]
     largest = 0.0
     for block in recording.blocks():
-        check_bits(recording.path, block, config.sample_w)
+        check_bits(recording.path, block, method.sample_w)
         n, m = block.samples.shape
-        found = tabulate(ENGINES[engine](block.samples, block.length, config), config, recording.bin_ns)
-        fit = fitted(found.echoes, found.waveforms["noise_mean"], m)
+        found = method(block.samples, block.length, recording.bin_ns)
+        fit = found.fitted(m)
         misfits.append(rmse(block.samples, block.length, fit))
         shares.append(r_squared(block.samples, block.length, fit))
         residual = np.where(np.arange(m) < block.length[:, None], block.samples - fit, 0.0)
@@ -117,7 +114,7 @@ def tables(results: dict[str, dict[str, Any]]) -> list[Table]:
     Parameters
     ----------
     results : dict
-        `score` of one recording by the name of the tap set.
+        `score` of one recording by the name of the method, of the core's by that of its tap set.
 
     Returns
     -------
@@ -126,7 +123,7 @@ def tables(results: dict[str, dict[str, Any]]) -> list[Table]:
     """
     modes = _table(
         "against references, bins",
-        ("taps", "reference"),
+        ("method", "reference"),
         (
             "modes",
             "within\n1",
@@ -140,28 +137,28 @@ def tables(results: dict[str, dict[str, Any]]) -> list[Table]:
     )
     fits = _table(
         "fit, counts; 5th, 50th and 95th percentile",
-        ("taps",),
+        ("method",),
         ("echoes/\nwaveform", "RMSE", "R²", "residual\nmean", "residual\ndeviation"),
     )
-    for taps, result in results.items():
+    for name, result in results.items():
         modes.add_section()
         for row in result["references"]:
             modes.add_row(
-                taps,
+                name,
                 row["name"],
                 f"{row['modes']}",
-                *(_number(row[name]) for name in ("within_1", "within_3")),
+                *(_number(row[key]) for key in ("within_1", "within_3")),
                 _number(row["spurious_per_waveform"], 2),
-                *(_number(row[name], 2) for name in ("peak_rms", "centre_rms")),
+                *(_number(row[key], 2) for key in ("peak_rms", "centre_rms")),
                 _number(row["ground_within_3"]),
                 _number(row["ground_median_error"], 2),
             )
         fits.add_row(
-            taps,
+            name,
             _number(result["echoes_per_waveform"], 2),
             " ".join(_number(value, 2) for value in result["rmse"].values()).strip(),
             " ".join(_number(value) for value in result["r_squared"].values()).strip(),
-            *(_number(result["residual"][name], 2) for name in ("mean", "deviation")),
+            *(_number(result["residual"][key], 2) for key in ("mean", "deviation")),
         )
     return [modes, fits] if modes.rows else [fits]
 
