@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import json
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -345,6 +347,34 @@ def score(
     if output is not None:
         content = {"tools": report.tools("numpy"), "source": file.name, "settings": given, "methods": results}
         report.save(output, content)
+
+
+@openecho.group()
+def scene() -> None:
+    """Scenes that a lidar flies over, each a YAML file, and those that are bundled."""
+
+
+@scene.command("list")
+def list_scenes() -> None:
+    """Name the bundled scenes, which are taken by name wherever a file is."""
+    for name, description in _scenes().bundled().items():
+        click.echo(f"{name:12}{description}")
+
+
+@scene.command("schema")
+@click.option("--json", "as_json", is_flag=True, help="As JSON Schema, for editors.")
+def scene_schema(as_json: bool) -> None:
+    """Say what a scene is made of: every key, its unit, what is assumed where it is left out, and what it means."""
+    scenes = _scenes()
+    click.echo(json.dumps(scenes.json_schema(), indent=2) if as_json else scenes.described())
+
+
+def _scenes() -> Any:
+    """What reads scenes, which needs packages that nothing else does."""
+    try:
+        return importlib.import_module("openecho.scene.schema")
+    except ModuleNotFoundError as error:
+        raise click.UsageError(str(error)) from error
 
 
 def _given(method: str, chosen: Mapping[str, Any], *others: str) -> dict[str, Any]:

@@ -240,6 +240,23 @@ def test_a_granule_cut_short_is_told_in_one_line(run: Run, tmp_path: Path) -> No
     refused(run("decompose", tmp_path / "a.h5", "-o", tmp_path / "e.csv"), "a.h5: ", "expected")
 
 
+def test_bundled_scenes_are_listed_with_what_they_show(run: Run) -> None:
+    status, out, err = run("scene", "list")
+    assert (status, err) == (0, "")
+    names = [line.split()[0] for line in out.splitlines()]
+    assert names == ["forest", "ice", "mountain", "roofs", "sea", "slope", "terraces", "woodland"]
+    assert all(len(line.split()) > 3 for line in out.splitlines())
+
+
+def test_the_schema_of_a_scene_is_printed_to_be_read_and_to_be_parsed(run: Run) -> None:
+    status, out, err = run("scene", "schema")
+    assert (status, err) == (0, "")
+    assert "  altitude: (length above 0 m) height over z = 0\n" in out
+    status, out, _ = run("scene", "schema", "--json")
+    assert status == 0
+    assert {"platform", "laser", "receiver", "digitiser", "targets"} <= set(json.loads(out)["properties"])
+
+
 def test_without_arguments_the_commands_are_listed(run: Run) -> None:
     status, out, _err = run("--help")
     assert status == 0
