@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from openecho.compiled import njit, share
 from openecho.decompose.choices import CRITERIA, PARAMETERS, STARTS
-from openecho.decompose.fit import echo_sum, problem, scaled, weight_roots
+from openecho.decompose.fit import GREATEST, deviations, echo_sum, problem, scaled, weight_roots
 from openecho.decompose.least_squares import (
     TRIAL_STEPS,
     FloatArray,
@@ -42,6 +42,8 @@ DOUBTFUL = 4
 """Times its price: an echo whose height squared, in its standard errors, is more than that needs no second trial."""
 QUIETEST = 1e-6
 """Of the greatest sample: deviation of the noise at least, or the search would find what rounding has left."""
+NOISIEST_SEARCH = 1e3
+"""Of the greatest sample: deviation at most. Nothing is found in either."""
 
 
 def find_echoes(
@@ -82,7 +84,7 @@ def find_echoes(
         Height of a residual behind the matched filter, in standard deviations of the noise there, that is worth an
         echo's trial.
     most : integer or array_like (n,), optional
-        Echoes of a waveform, from 0.
+        Echoes of a waveform, from 0; never more than its samples can determine.
     criterion : str, optional
         One of `CRITERIA`.
     start : str, optional
@@ -110,15 +112,14 @@ def find_echoes(
     """
     rows, lengths, scale = scaled(samples, length)
     roots = weight_roots(weight, rows)
-    guides = rows if smoothed is None else np.asarray(smoothed, np.float64) / scale[:, None]
+    with np.errstate(over="ignore"):
+        guides = rows if smoothed is None else np.asarray(smoothed, np.float64) / scale[:, None]
     if guides.shape != rows.shape or not np.isfinite(guides).all():
         raise ValueError(f"smoothed: found shape {guides.shape}, expected finite ones of shape {rows.shape}")
-    deviation = np.asarray(noise, np.float64)
-    if deviation.shape != (len(rows),):
-        raise ValueError(f"noise: found shape {deviation.shape}, expected ({len(rows)},)")
-    if not (deviation >= 0).all():
-        raise ValueError("noise: found one below 0, expected 0 or more")
-    limit = np.broadcast_to(np.asarray(most, np.int64), len(rows))
+    deviation = np.clip(deviations(noise, scale), QUIETEST, NOISIEST_SEARCH)
+    limit = np.asarray(most)
+    if limit.dtype.kind not in "iu" or limit.shape not in ((), (len(rows),)):
+        raise ValueError(f"most: found {limit.dtype} of shape {limit.shape}, expected integers, () or ({len(rows)},)")
     if not (0 < width < math.inf and 0 <= least < math.inf and (limit >= 0).all()):
         raise ValueError(f"width, least, most: found {width}, {least}, {most!r}, expected above 0, from 0, from 0")
     for name, value, known in (("criterion", criterion, CRITERIA), ("start", start, STARTS)):
@@ -129,14 +130,14 @@ def find_echoes(
     search = _search(start, width, least, given, correlation)
     price = CRITERIA[criterion](np.maximum(lengths, 2).astype(float))
     count = np.zeros(len(rows), np.int64)
+    limit = np.minimum(limit, np.maximum(lengths - 1, 0) // PARAMETERS)
     found = np.zeros((len(rows), limit.max(initial=0), PARAMETERS))
-    with np.errstate(over="ignore"):
-        deviation = np.clip(deviation / scale, QUIETEST, 1e3)
     baseline = np.zeros(len(rows))
     guessed = limit if start != "none" else np.zeros_like(limit)
     tables = rows, roots, guides, lengths, deviation, price * deviation**2, guessed, limit
     share(_find, len(rows), *tables, search, given, count, found, baseline)
-    found[:, :, 0] *= scale[:, None]
+    with np.errstate(over="ignore"):
+        found[:, :, 0] = np.minimum(found[:, :, 0] * scale[:, None], GREATEST)
     return count, found[np.arange(found.shape[1]) < count[:, None]], baseline * scale
 
 

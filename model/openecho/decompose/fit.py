@@ -28,6 +28,11 @@ from openecho.enhance.autoregression import whitening
 GREATEST = 1e300
 """Counts: what is fitted to them may be a thousand times as high."""
 
+NOISIEST = 1e100
+"""Deviation of the noise at most, in units of the greatest sample."""
+GREATEST_WIDTH = 1e5
+"""Of a usual echo, bins: longer than any record."""
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -137,21 +142,20 @@ def fit_echoes(
         raise ValueError(f"count: found shape {counts.shape}, expected ({len(rows)},)")
     if (counts < 0).any() or counts.sum() != len(first_values):
         raise ValueError(f"start: found {len(first_values)} echoes, expected {counts.sum()}, the sum of count")
-    _check_finite("start", first_values)
+    check_finite("start", first_values)
     given = problem(pulse, correlation, widths, width)
     roots = weight_roots(weight, rows)
     inside = np.arange(rows.shape[1]) < lengths[:, None]
     with np.errstate(over="ignore"):  # what is too high by far is brought to its border
         first_values[:, 0] /= np.repeat(scale, counts)
         first = np.min(rows, axis=1, initial=1, where=inside) if baseline is None else np.asarray(baseline) / scale
-        deviation = np.full(len(rows), np.nan) if noise is None else np.asarray(noise, np.float64) / scale
+        deviation = np.full(len(rows), np.nan) if noise is None else deviations(noise, scale)
     size = 3 * counts + 1
     echo, unknown, block = (np.append(0, np.cumsum(sizes)) for sizes in (counts, size, size**2))
     values, errors, covariance = np.empty(unknown[-1]), np.empty(unknown[-1]), np.empty(block[-1])
     rms, converged = np.empty(len(rows)), np.empty(len(rows), np.bool_)
-    for what in (first, deviation):
-        if what.shape != (len(rows),):
-            raise ValueError(f"baseline, noise: found shape {what.shape}, expected ({len(rows)},)")
+    if first.shape != (len(rows),):
+        raise ValueError(f"baseline: found shape {first.shape}, expected ({len(rows)},)")
     share(
         _fit,
         len(rows),
@@ -228,7 +232,10 @@ def echo_sum(
 
 def scaled(samples: ArrayLike, length: ArrayLike) -> tuple[FloatArray, IntArray, FloatArray]:
     """Waveforms (n, m) in units of the greatest sample of each, 0 past their lengths (n,), and these units (n,)."""
-    rows, lengths = np.array(samples, np.float64), np.asarray(length, np.int64)
+    rows, lengths = np.array(samples, np.float64), np.asarray(length)
+    if lengths.dtype.kind not in "iu" and lengths.size:
+        raise ValueError(f"length: found {lengths.dtype}, expected whole numbers")
+    lengths = lengths.astype(np.int64)
     if rows.ndim != 2:
         raise ValueError(f"samples: found {rows.ndim} dimensions, expected 2, waveforms and samples")
     if lengths.shape != (len(rows),):
@@ -236,11 +243,22 @@ def scaled(samples: ArrayLike, length: ArrayLike) -> tuple[FloatArray, IntArray,
     if (lengths < 0).any() or (lengths > rows.shape[1]).any():
         raise ValueError(f"length: found one outside 0 to {rows.shape[1]}, the samples of a row")
     rows[np.arange(rows.shape[1]) >= lengths[:, None]] = 0
-    _check_finite("samples", rows)
+    check_finite("samples", rows)
     scale = np.abs(rows).max(axis=1, initial=0)
     scale[scale == 0] = 1
     rows /= scale[:, None]
     return rows, lengths, scale
+
+
+def deviations(noise: ArrayLike, scale: FloatArray) -> FloatArray:
+    """Deviation of the noise of each waveform (n,) in units of `scale`, checked, and nothing that products overflow."""
+    deviation = np.asarray(noise, np.float64)
+    if deviation.shape != scale.shape:
+        raise ValueError(f"noise: found shape {deviation.shape}, expected {scale.shape}")
+    if not (deviation >= 0).all():
+        raise ValueError("noise: found one below 0, expected 0 or more")
+    with np.errstate(over="ignore"):
+        return np.minimum(deviation / scale, NOISIEST)
 
 
 def weight_roots(weight: ArrayLike | None, rows: FloatArray) -> FloatArray:
@@ -257,15 +275,16 @@ def problem(pulse: Pulse | None, correlation: ArrayLike, widths: str, width: flo
     """What all waveforms have in common, checked."""
     if widths not in WIDTHS:
         raise ValueError(f"widths: found {widths!r}, expected one of {', '.join(WIDTHS)}")
-    if not 0 < width < np.inf:
-        raise ValueError(f"width: found {width}, expected a number of bins above 0")
+    if not LEAST_WIDTH <= width <= GREATEST_WIDTH:
+        raise ValueError(f"width: found {width}, expected {LEAST_WIDTH:.3g} to {GREATEST_WIDTH:g} bins")
     shape = gaussian() if pulse is None else pulse
     if widths == "fixed" and width < shape.narrowest:
         raise ValueError(f"width: found {width}, expected at least the pulse's, {shape.narrowest:g}")
     return Problem(shape, whitening(correlation), widths == "shared", float(width) if widths == "fixed" else 0.0)
 
 
-def _check_finite(name: str, values: FloatArray) -> None:
+def check_finite(name: str, values: FloatArray) -> None:
+    """Refuse values that squares or sums would overflow with."""
     if not (np.abs(values) <= GREATEST).all():
         raise ValueError(f"{name}: found a value that is not finite or beyond {GREATEST:g}, expected none")
 
@@ -308,7 +327,7 @@ def _fit(
         for i in range(size):
             unit[i] = 1.0 if i % 3 == 2 else scale[n]
             if i % 3 == 0 and i > 0:
-                u[i] = unit[i] = np.exp(u[i])
+                u[i] = unit[i] = given.width if given.width > 0 else np.exp(u[i])
             else:
                 u[i] *= unit[i]
             errors[unknown[n] + i] = error[i] * noise * unit[i] if error[i] < np.inf else np.inf

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from openecho.decompose.columns import dtype
 from openecho.decompose.decomposition import NOT_CONVERGED, WAVEFORM, Decomposition
 from openecho.decompose.find import find_echoes
-from openecho.decompose.fit import Fit, fit_echoes
+from openecho.decompose.fit import GREATEST, GREATEST_WIDTH, Fit, check_finite, fit_echoes
+from openecho.decompose.least_squares import LEAST_WIDTH
 from openecho.decompose.pulses import Pulse, gaussian, laser, measured, rough
 from openecho.enhance import noise, vondrak
 from openecho.golden import TRUNCATED
@@ -23,6 +24,8 @@ BoolArray = NDArray[np.bool_]
 
 PASSBAND = 2.5
 """Of the Vondrák smoothing, radians a width: a Gaussian echo has 4 % of its amplitude there, 2e-4 at twice that."""
+LIMITS = {"width": GREATEST_WIDTH, "noise": GREATEST, "misfit": 1.0, "saturation": GREATEST, "epsilon": GREATEST}
+"""Settings that are numbers from 0, and the greatest of each."""
 MOST = 64
 """Echoes of a waveform that can be asked for: the time for a fit rises with the square of their number."""
 ENOUGH = 16
@@ -96,15 +99,17 @@ class Fitting:
 
     def __post_init__(self) -> None:
         """Refuse what no waveform is needed for to see that it is wrong."""
-        limits = {name: getattr(self, name) for name in ("noise", "misfit", "saturation", "epsilon")}
-        for name, value in limits.items():
-            if value is not None and not 0 <= value < np.inf:
-                raise ValueError(f"{name}: found {value}, expected a number from 0")
+        for name, greatest in LIMITS.items():
+            value = getattr(self, name)
+            if value is not None and not 0 <= value <= greatest:
+                raise ValueError(f"{name}: found {value}, expected a number from 0 to {greatest:g}")
+        if self.width < LEAST_WIDTH:
+            raise ValueError(f"width: found {self.width}, expected {LEAST_WIDTH:.3g} to {GREATEST_WIDTH:g} bins")
         if self.shape == "gaussian" and (self.rough or self.transmitted is not None):
             raise ValueError("rough, transmitted: found one with a Gaussian, expected them with the laser's methods")
         if self.epsilon is not None and not self.smoothed:
             raise ValueError(f"epsilon: found {self.epsilon}, expected it with method vl alone")
-        if self.most > MOST:
+        if not isinstance(self.most, int | np.integer) or not 0 <= self.most <= MOST:
             raise ValueError(f"most: found {self.most}, expected 0 to {MOST}")
         self(np.zeros((1, 8)), np.array([8]), None)
 
@@ -115,7 +120,7 @@ class Fitting:
 
     def __call__(self, samples: NDArray[Any], length: NDArray[Any], bin_ns: float | None) -> Decomposition:
         """Decompose waveforms (n, m) of so many samples (n,), counts; with nanoseconds if a bin's are known."""
-        rows, lengths = np.asarray(samples, np.float64), np.asarray(length, np.int64)
+        rows, lengths = _checked(samples, length)
         recorded = np.arange(rows.shape[1]) < lengths[:, None]
         deviation = _noise(rows, recorded) if self.noise is None else np.full(len(rows), float(self.noise))
         common: dict[str, Any] = {
@@ -149,6 +154,21 @@ class Fitting:
         # Of less than three samples nothing could be smoothed, and what was not recorded does no harm.
         short = np.count_nonzero(recorded, axis=1, keepdims=True) < 3
         return vondrak(rows, epsilon, weight=recorded | short)
+
+
+def _checked(samples: NDArray[Any], length: NDArray[Any]) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Samples and lengths as the fit takes them."""
+    rows, lengths = np.asarray(samples), np.asarray(length)
+    if rows.dtype.kind not in "biuf":
+        raise ValueError(f"samples: found {rows.dtype}, expected real numbers")
+    if rows.ndim != 2:
+        raise ValueError(f"samples: found shape {rows.shape}, expected (waveforms, samples)")
+    if lengths.shape != (len(rows),):
+        raise ValueError(f"length: found shape {lengths.shape}, expected ({len(rows)},)")
+    if lengths.dtype.kind not in "iu":
+        raise ValueError(f"length: found {lengths.dtype}, expected whole numbers")
+    check_finite("samples", rows)
+    return rows.astype(np.float64), lengths.astype(np.int64)
 
 
 @lru_cache(maxsize=8)

@@ -32,6 +32,8 @@ STEPS, TRIAL_STEPS = 300, 30
 LEAST_GAIN = 1e-9
 """Of a step, as a part of the sum of squares: the last step. What is left to gain then is less by far, for steps grow
 shorter each time, and this one is at most a thousandth of a standard error in a thousand samples."""
+ROUNDING = 2.0**-104
+"""What each sample, of 1 at most, adds to the sum of squares by its rounding: without noise, steps gain no less."""
 
 
 class Waveform(NamedTuple):
@@ -116,7 +118,7 @@ def minimise(
                 step[6::3] = step[3]
             for i in range(unknowns):
                 tried[i] = min(max(u[i] + step[i], low[i]), high[i])
-            if damping <= 1e-3 and step @ gradient <= LEAST_GAIN * squares:
+            if damping <= 1e-3 and step @ gradient <= LEAST_GAIN * squares + ROUNDING * length:
                 u[:] = tried
                 return normal, squares, True
             gain = squares - evaluate(waveform, tried, problem, slopes, residual, tried_normal, tried_gradient)

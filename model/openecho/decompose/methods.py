@@ -71,6 +71,9 @@ def prepare(name: str, longest: int, settings: Mapping[str, Any]) -> Method:
     try:
         if name == "inflection":
             return Inflection(engine=given.pop("engine", "model"), config=configure(longest, **given))
+        for series in ("transmitted", "correlation"):
+            if given.get(series) is not None:
+                given[series] = tuple(np.asarray(given[series], np.float64).tolist())
         fitting: Any = importlib.import_module("openecho.decompose.fitting").Fitting
         method: Method = fitting(**FITTED[name], **given)
     except TypeError as error:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from openecho.compiled import njit
-from openecho.decompose.least_squares import Problem, Waveform, add_slopes, hold, solve, whiten
+from openecho.decompose.least_squares import LEAST_WIDTH, Problem, Waveform, add_slopes, hold, solve, whiten
 
 FloatArray = NDArray[np.float64]
 
@@ -157,8 +157,8 @@ def interval(curve: FloatArray, place: int, low: int, high: int, search: Search)
         half = place - left
     else:
         centre, half = (left + right) / 2, (right - left) / 2
-    # The smoothed echo's variance is the sum of both; noise can make it less than that.
-    return centre, 0.5 * np.log(max(half**2 - search.smoothing**2, half**2 / 16))
+    # The smoothed echo's variance is the sum of both; noise can make it less than that, and its inflections one.
+    return centre, 0.5 * np.log(max(half**2 - search.smoothing**2, half**2 / 16, LEAST_WIDTH**2))
 
 
 @njit()
