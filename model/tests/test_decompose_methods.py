@@ -18,7 +18,7 @@ import openecho
 from openecho.decompose import FITTED, METHODS, Decomposition, dtype
 from openecho.decompose.decomposition import NOT_CONVERGED
 from openecho.decompose.find import find_echoes
-from openecho.decompose.fit import echo_sum, fit_echoes
+from openecho.decompose.fit import GREATEST, echo_sum, fit_echoes
 from openecho.decompose.pulses import gaussian, laser, measured, rough
 from openecho.enhance import noise
 from openecho.golden import TRUNCATED
@@ -328,9 +328,9 @@ def test_the_cores_own_method_loads_no_compiler(tmp_path: Path) -> None:
 
 sizes = st.tuples(st.integers(1, 3), st.integers(0, 60))
 numbers = (
-    arrays(np.float64, sizes, elements=st.floats(-1e297, 1e297))  # a fit may be a thousand times as high
+    arrays(np.float64, sizes, elements=st.floats(allow_nan=False, allow_infinity=False))
     | arrays(np.float64, sizes, elements=st.floats(-1e-300, 1e-300))
-    | arrays(np.float64, sizes, elements=st.just(7.5) | st.just(1e297))
+    | arrays(np.float64, sizes, elements=st.just(7.5) | st.just(1e300))
     | arrays(np.uint16, sizes, elements=st.integers(0, 3) | st.just(1023))
     | st.sampled_from([np.int8, np.uint16, np.int64, np.uint64]).flatmap(lambda kind: arrays(kind, sizes))
     | sizes.map(lambda size: np.full(size, 1023))
@@ -353,8 +353,8 @@ def test_any_finite_array_has_an_answer_or_one_line(samples: NDArray[Any], metho
     except ValueError as caught:
         (line,) = str(caught).splitlines()
         assert ": found " in line
-        # A fit takes any samples at all, if there are some.
-        assert method == "inflection" or samples.size == 0
+        # A fit takes any samples up to its limit, if there are some.
+        assert method == "inflection" or samples.size == 0 or np.abs(samples.astype(float)).max() > GREATEST
         return
     assert len(found.waveforms) == len(samples)
     assert found.waveforms["echoes"].sum() == len(found.echoes)

@@ -17,6 +17,7 @@ from openecho.decompose.fit import GREATEST, GREATEST_WIDTH, Fit, check_finite, 
 from openecho.decompose.least_squares import LEAST_WIDTH
 from openecho.decompose.pulses import Pulse, gaussian, laser, measured, rough
 from openecho.enhance import noise, vondrak
+from openecho.enhance.wavelet import MAD
 from openecho.golden import TRUNCATED
 
 FloatArray = NDArray[np.float64]
@@ -34,8 +35,6 @@ ROUNDING = 12**-0.5
 """Deviation of the rounding to whole counts, the least that the noise of counts can have; Bennett 1948."""
 DIFFERENCES = 4
 """Order of the differences whose deviation stands for the noise where a waveform has no other place for it."""
-MAD = 1.482602218505602
-"""σ of a normal distribution in its median absolute deviation, 1 / Φ⁻¹(3/4)."""
 
 
 @dataclass(frozen=True)
