@@ -6,6 +6,7 @@ import hashlib
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ __all__ = ["njit", "share"]
 config: Any = numba.config
 
 PACKAGE = Path(__file__).parent
-ROOMS = ("decompose", "enhance")
+ROOMS = ("decompose", "enhance", "scene")
 """Where there are functions to compile."""
 
 WORTH_A_THREAD = 64
@@ -34,7 +35,7 @@ def _folder() -> str:
 
     Numba looks at the file of a function alone, and would go on with the old code of another that it calls.
     """
-    sources = b"".join(path.read_bytes() for room in ROOMS for path in sorted((PACKAGE / room).glob("*.py")))
+    sources = b"".join(path.read_bytes() for room in ROOMS for path in sorted((PACKAGE / room).rglob("*.py")))
     return str(PACKAGE / "__pycache__" / f"compiled-{hashlib.sha256(sources).hexdigest()[:16]}")
 
 
@@ -55,7 +56,7 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     return compiled
 
 
-def share(kernel: Callable[..., Any], waveforms: int, *arguments: Any) -> None:
+def share(kernel: Callable[..., Any], waveforms: int, *arguments: Any, worth: int = WORTH_A_THREAD) -> None:
     """Call a compiled kernel, which holds no lock (`nogil`), for ranges of waveforms, on as many threads as numba has.
 
     Not with numba's own `prange`, for that takes no tuples of arrays.
@@ -68,14 +69,20 @@ def share(kernel: Callable[..., Any], waveforms: int, *arguments: Any) -> None:
         How many there are.
     *arguments
         What the kernel reads, and arrays that it fills.
+    worth : int
+        Waveforms that are worth a thread.
     """
-    threads = max(1, min(numba.get_num_threads(), waveforms // WORTH_A_THREAD))
+    threads = max(1, min(numba.get_num_threads(), waveforms // worth))
     if threads == 1:
         kernel(0, waveforms, *arguments)
         return
     # Four ranges a thread: some waveforms take longer.
-    edges = np.linspace(0, waveforms, 4 * threads + 1).astype(np.int64)
-    with ThreadPoolExecutor(threads) as pool:
-        tasks = [pool.submit(kernel, *edge, *arguments) for edge in pairwise(edges)]
-        for task in tasks:
-            task.result()
+    edges = np.linspace(0, waveforms, min(4 * threads, waveforms) + 1).astype(np.int64)
+    tasks = [_pool(threads).submit(kernel, *edge, *arguments) for edge in pairwise(edges)]
+    for task in tasks:
+        task.result()
+
+
+@cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads)

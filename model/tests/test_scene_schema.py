@@ -171,6 +171,7 @@ def test_targets_pulse_and_scan_of_every_kind_survive_a_dump(tmp_path: Path) -> 
         {"kind": "terrain", "map": {"file": "dem.tif"}, **REFLECTANCE},
         ROOFS,
         {"kind": "mesh", "file": "a.stl", "rotation": ["0 deg", "90 deg", "0 deg"], "scale": 0.001, **REFLECTANCE},
+        {"kind": "mesh", "file": "a.stl", "sheet": True, **REFLECTANCE},
         TREE,
         yaml.safe_load(SCENES["forest"])["targets"][1],
     ]
@@ -265,7 +266,7 @@ def test_what_is_no_length_is_refused(text: Any) -> None:
         ("laser.pulse", {"fwhm": "5 ns"}, "laser.pulse.shape: found nothing, expected it"),
         ("digitiser.bits", 17, "digitiser.bits: found 17, expected a whole number from 8 to 16"),
         ("digitiser.bits", True, "digitiser.bits: found true, expected a whole number from 8 to 16"),
-        ("digitiser.offset", "5000 counts", "digitiser.offset: found 5000 counts, expected 0 to 4095 for its bits"),
+        ("digitiser.offset", "5000 counts", "digitiser.offset: found 5000 counts, expected 0 to 2047 for its bits"),
         ("digitiser.gain", "2 counts", "digitiser.gain: found 2 counts, expected counts per power, as 2 counts/nW"),
         (
             "receiver.responsivity",
@@ -382,6 +383,19 @@ def test_speckle_is_on_off_or_an_order(written: str, value: object) -> None:
     assert (speckle, type(speckle)) == (value, type(value))
 
 
+@pytest.mark.parametrize(("written", "value"), [("on", True), ("off", False), ("true", True), ("false", False)])
+def test_a_sheet_is_on_or_off(written: str, value: bool, tmp_path: Path) -> None:
+    (tmp_path / "a.stl").touch()
+    mesh = f"  - {{kind: mesh, file: a.stl, sheet: {written}, reflectance: {{albedo: 0.3}}}}\n"
+    scene = re.sub(r"(?ms)^targets:.*", f"targets:\n{mesh}", SCENES["ice"])
+    target = loads(scene, tmp_path / "a.yaml").targets[0]
+    assert isinstance(target, schema.Mesh)
+    assert target.sheet is value
+    assert refusal(scene.replace(f"sheet: {written}", "sheet: 1"), tmp_path / "a.yaml") == (
+        "targets[0].sheet: found 1, expected on or off"
+    )
+
+
 @pytest.mark.parametrize(
     ("text", "line"),
     [
@@ -458,6 +472,7 @@ def test_the_description_tells_every_key_with_its_meaning() -> None:
         assert meaning in text, (section, name)
     assert "divergence: (angle above 0 deg to 45 deg) full angle of a beam" in text
     assert "temperature: (temperature above 0 K) [293.15 K]" in text
+    assert "sheet: (on or off) [off] it is open" in text
     assert max(len(line) for line in described().splitlines()) <= 120
 
 

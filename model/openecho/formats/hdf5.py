@@ -117,7 +117,7 @@ def _open_lvis(path: Path, file: h5py.File, names: dict[str, str], stack: ExitSt
         format="LVIS L1B",
         waveforms=waveforms,
         longest=length,
-        bin_ns=LVIS_BIN_NS.get(last_bin),
+        bin_ns=_lvis_bin_ns(path, file, last_bin),
         coordinates=DEGREES if ends else None,
         time_unit=None if time is None else "seconds of the UTC day",
         volts=None,
@@ -149,6 +149,16 @@ def _lvis_geolocation(
             side.append(dataset(path, file, names[name], 1, waveforms))
         sides.append(side)
     return last, (sides[0], sides[1])
+
+
+def _lvis_bin_ns(path: Path, file: h5py.File, last_bin: int) -> float | None:
+    """Sample interval by the attribute ``bin_ns``, which simulated granules have, or by the data structure."""
+    if "bin_ns" not in file.attrs:
+        return LVIS_BIN_NS.get(last_bin)
+    told = np.asarray(file.attrs["bin_ns"])
+    if told.size != 1 or told.dtype.kind not in "iuf" or not 0 < float(told.reshape(())) < np.inf:
+        raise DataError(f"{path}: bin_ns is {told.reshape(-1)[:4].tolist()}, expected one positive number")
+    return float(told.reshape(()))
 
 
 @dataclass(frozen=True)

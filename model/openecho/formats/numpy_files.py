@@ -1,4 +1,4 @@
-"""NumPy files: ``.npz`` with `samples`, `length` and maybe `bin_ns`; or ``.npy`` with (n, m), every row full."""
+"""NumPy files: ``.npz`` with `samples`, `length` and maybe more; or ``.npy`` with (n, m), every row full."""
 
 from __future__ import annotations
 
@@ -16,12 +16,19 @@ from openecho.formats.recording import (
     LARGEST_EXPANSION,
     Block,
     DataError,
+    Geolocation,
     Recording,
     check_range,
     check_waveforms,
     printable,
     to_counts,
 )
+
+KEYS = ("samples", "length", "bin_ns", "first", "last", "time")
+"""Members that are read."""
+
+STEPS = (1e-3, 1e-3, 1e-3)
+"""Metres, of coordinates."""
 
 COPIED = 2**20
 """Bytes that are checked or decompressed at a time."""
@@ -46,7 +53,7 @@ def open_npy(path: Path) -> Recording:
     """
     with path.open("rb") as file:
         samples = _map(path, "samples", file)
-        return _recording(path, "npy", samples, None, None, ExitStack())
+        return _recording(path, "npy", {"samples": samples}, ExitStack())
 
 
 def open_npz(path: Path) -> Recording:
@@ -58,7 +65,8 @@ def open_npz(path: Path) -> Recording:
     Parameters
     ----------
     path : Path
-        Archive with `samples` (n, m), `length` (n,) and maybe `bin_ns`, stored or deflated.
+        Archive with `samples` (n, m) and `length` (n,), stored or deflated; maybe `bin_ns`; maybe `first` and `last`
+        (n, 3), where the first and the last bin are, x, y, z in metres; maybe `time` (n,), seconds from the first shot.
 
     Returns
     -------
@@ -77,22 +85,12 @@ def open_npz(path: Path) -> Recording:
                 f"{path}: no key {' or '.join(missing)}, expected samples and length, "
                 f"found {printable(', '.join(members)) or 'none'}"
             )
-        arrays = {
-            key: unpacked(path, archive, members[key], stack)
-            for key in ("samples", "length", "bin_ns")
-            if key in members
-        }
-        return _recording(path, "npz", arrays["samples"], arrays["length"], arrays.get("bin_ns"), stack.pop_all())
+        arrays = {key: unpacked(path, archive, members[key], stack) for key in KEYS if key in members}
+        return _recording(path, "npz", arrays, stack.pop_all())
 
 
-def _recording(
-    path: Path,
-    format: str,
-    samples: NDArray[Any],
-    length: NDArray[Any] | None,
-    bin_ns: NDArray[Any] | None,
-    stack: ExitStack,
-) -> Recording:
+def _recording(path: Path, format: str, arrays: dict[str, NDArray[Any]], stack: ExitStack) -> Recording:
+    samples, length = arrays["samples"], arrays.get("length")
     if samples.ndim != 2:
         raise DataError(f"{path}: samples have {samples.ndim} dimensions, expected 2, (waveform, sample)")
     check_waveforms(path, samples.shape[0], samples.shape[1])
@@ -104,25 +102,31 @@ def _recording(
     _check_integers(path, "length", length)
     check_range(path, "length", length, 1, samples.shape[1])
     lengths = length.astype(np.int32)
+    located = "first" in arrays and "last" in arrays
+    for key, shape in (("first", (len(lengths), 3)), ("last", (len(lengths), 3)), ("time", (len(lengths),))):
+        if key in arrays:
+            _check_floats(path, key, arrays[key], shape)
 
     def read(first: int, count: int) -> Block:
         rows = slice(first, first + count)
         longest = int(lengths[rows].max())
         counts = to_counts(path, "samples", samples[rows, :longest], first, lengths[rows])
-        return Block(first, counts, lengths[rows])
+        ends = Geolocation(arrays["first"][rows], arrays["last"][rows]) if located else None
+        return Block(first, counts, lengths[rows], arrays["time"][rows] if "time" in arrays else None, ends)
 
     return Recording(
         path=path,
         format=format,
         waveforms=len(lengths),
         longest=int(lengths.max()),
-        bin_ns=_bin_ns(path, bin_ns),
-        coordinates=None,
-        time_unit=None,
+        bin_ns=_bin_ns(path, arrays.get("bin_ns")),
+        coordinates="x, y, z (metres)" if located else None,
+        time_unit="seconds since the first shot" if "time" in arrays else None,
         volts=None,
         parts=((None, len(lengths)),),
         reader=read,
         closer=stack.close,
+        resolution=STEPS if located else None,
     )
 
 
@@ -194,6 +198,11 @@ def _map(path: Path, name: str, file: IO[bytes]) -> NDArray[Any]:
 def _check_integers(path: Path, name: str, array: NDArray[Any]) -> None:
     if not np.issubdtype(array.dtype, np.integer):
         raise DataError(f"{path}: {name} are of dtype {array.dtype}, expected integers")
+
+
+def _check_floats(path: Path, name: str, array: NDArray[Any], shape: tuple[int, ...]) -> None:
+    if array.dtype.kind != "f" or array.shape != shape:
+        raise DataError(f"{path}: {name} has shape {array.shape} of {array.dtype}, expected {shape} of floats")
 
 
 def _bin_ns(path: Path, value: NDArray[Any] | None) -> float | None:

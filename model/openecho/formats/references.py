@@ -93,7 +93,8 @@ def _from_npz(path: Path, n: int) -> tuple[Reference, ...]:
     more than k, says that a waveform is not judged, as does ``has_modes`` (n,) where it is False.
     ``ref_<name>_zcross`` (n,) is the ground. ``ref_<name>_gloc`` (n,) is a single mode, nan where there is no fit.
     ``ref_decomposition`` (rows, 3 or more) has a mode a row: the waveform in column 0 and its bin in column 2, both
-    from 1. ``ref_ground_bin`` (n,) is the ground of those that have none of their own.
+    from 1. ``ref_ground_bin`` (n,) is the ground of those that have none of their own. ``truth`` is what
+    `openecho.scene.simulate` tells.
     """
     with ExitStack() as stack, zipfile.ZipFile(path) as archive:
         found = keys(archive)
@@ -126,7 +127,26 @@ def _from_npz(path: Path, n: int) -> tuple[Reference, ...]:
             waveform, position = _decomposition(path, rows, n)
             mine = np.isin(np.arange(n), waveform)
             made.append(_reference("decomposition", waveform, position, ground, mine, mine))
+        if "truth" in found:
+            made.append(_truth(path, unpacked(path, archive, found["truth"], stack), n))
         return tuple(made)
+
+
+def _truth(path: Path, rows: NDArray[Any], n: int) -> Reference:
+    """Every surface that a simulated beam met, and the ground: the last one that is no leaf."""
+    names = rows.dtype.names or ()
+    if rows.ndim != 1 or not {"waveform", "bin", "incidence"} <= set(names):
+        raise DataError(f"{path}: truth has the fields {', '.join(names) or 'none'}, expected waveform, bin, incidence")
+    strange = np.flatnonzero(~((rows["waveform"] >= 0) & (rows["waveform"] < n)))
+    if len(strange):
+        found = rows["waveform"][strange[0]]
+        raise DataError(f"{path}: truth of row {strange[0]} is waveform {found}, expected 0 to {n - 1}")
+    # A surface may be beyond the window, and nobody can find it there.
+    rows = rows[(rows["bin"] >= LOWEST) & (rows["bin"] <= HIGHEST)]
+    ground, solid = np.full(n, -np.inf), ~np.isnan(rows["incidence"])
+    np.maximum.at(ground, rows["waveform"][solid], rows["bin"][solid])
+    waveform, position = rows["waveform"].astype(np.int64), rows["bin"].astype(np.float64)
+    return _reference("truth", waveform, position, ground, np.ones(n, bool), np.isfinite(ground))
 
 
 def _decomposition(path: Path, rows: NDArray[Any], n: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

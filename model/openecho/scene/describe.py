@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from openecho.scene.fields import File, OnOff, Quantity, Whole
+from openecho.scene.fields import File, Flag, OnOff, Quantity, Whole
 
 WIDTH = 100
 """Columns of a line."""
@@ -71,7 +71,7 @@ def _parts(annotation: Any, metadata: Iterable[Any] = ()) -> Iterator[Any]:
 
 def _written(annotation: Any, parts: list[Any]) -> str:
     """What is to be written for a key, in words."""
-    texts = [part.text for part in parts if isinstance(part, (Quantity, Whole, File, OnOff))]
+    texts = [part.text for part in parts if isinstance(part, (Quantity, Whole, File, Flag, OnOff))]
     texts += [" | ".join(get_args(part)) for part in parts if get_origin(part) is Literal]
     return f"[{', '.join(texts)}]" if get_origin(annotation) is tuple or len(texts) > 1 else (texts or ["text"])[0]
 

@@ -157,3 +157,22 @@ class OnOff:
             return Quantity(units.RATIO, 1).parsed(value)
         except PydanticCustomError as error:
             raise wrong(f"found {quoted(value)}, expected {self.text}") from error
+
+
+@dataclass(frozen=True)
+class Flag:
+    """On or off."""
+
+    text: ClassVar[str] = "on or off"
+
+    def __get_pydantic_core_schema__(self, _: Any, __: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.parsed)
+
+    def __get_pydantic_json_schema__(self, _: core_schema.CoreSchema, __: GetJsonSchemaHandler) -> dict[str, Any]:
+        return {"type": "boolean"}
+
+    def parsed(self, value: Any) -> bool:
+        """A bool as it is."""
+        if not isinstance(value, bool):
+            raise wrong(f"found {quoted(value)}, expected {self.text}")
+        return value

@@ -11,6 +11,9 @@ import os
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
+import numpy as np
+from numpy.typing import NDArray
+
 try:
     from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 except ModuleNotFoundError as error:
@@ -22,7 +25,7 @@ from openecho.formats.recording import MAX_LENGTH
 from openecho.scene import units
 from openecho.scene.describe import lines, summary
 from openecho.scene.document import SceneError, dumps, explained, parse, read
-from openecho.scene.fields import File, OnOff, Quantity, Whole, wrong
+from openecho.scene.fields import File, Flag, OnOff, Quantity, Whole, wrong
 from openecho.scene.units import quoted
 
 __all__ = ["Scene", "SceneError", "bundled", "described", "dumped", "json_schema", "load"]
@@ -256,6 +259,10 @@ class Tolerance(Section):
     )
     noise: Annotated[float, Quantity(units.RATIO, 0)] = Field(default=0.1, description="share of the noise's deviation")
 
+    def allowed(self, variance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Counts, for noise of some variance, counts²."""
+        return np.maximum(self.counts, self.noise * np.sqrt(variance))
+
     @model_validator(mode="after")
     def _ends(self) -> Self:
         if self.counts == 0 and self.noise == 0:
@@ -422,6 +429,9 @@ class Mesh(Target):
     )
     rotation: tuple[Angle, Angle, Angle] = Field(
         default=(0.0, 0.0, 0.0), description="about x, then y, then z, right-handed"
+    )
+    sheet: Annotated[bool, Flag()] = Field(
+        default=False, description="it is open, as a sheet is; else an edge of one triangle is a hole, and refused"
     )
 
 

@@ -1,0 +1,1 @@
+"""Geometry: where beams go and what they meet."""
