@@ -22,7 +22,7 @@ TAPS_FLAG  := $(if $(TAPS),--taps='$(TAPS)')
 SIM_FLAGS  := $(if $(MODULE),--module '$(MODULE)') $(ARITH_FLAG) $(TAPS_FLAG) $(if $(SIM),--sim '$(SIM)') \
               $(if $(DATA),--data '$(DATA)') $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(WAVES)),--waves)
 
-.PHONY: help sim replay test vectors lint format mutate formal synth vivado coverage precision score figures bench scale registers readme clean
+.PHONY: help sim replay test vectors lint format mutate formal synth vivado coverage precision score figures bench scenes scale registers readme clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -72,6 +72,9 @@ figures: $(READY) ## the V–L paper's figures, ours: accumulation, wavelet, Von
 
 bench: $(VENV)/.bench ## speed and precision of the Gaussian fit beside gdecomp and curve_fit, on one core [SEED=] [QUICK=1]
 	@$(RUN) -m openecho.study.bench $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(QUICK)),--quick)
+
+scenes: $(READY) ## methods against the truth of every bundled scene, its plan against full fidelity, speed, a recorded set [SEED=]
+	@$(RUN) -m openecho.study.scenes $(if $(SEED),--seed '$(SEED)')
 
 scale: $(READY) ## speed and memory on a large granule, interrupted, resumed and in two processes [SEED=]
 	@$(RUN) -m openecho.study.scale $(if $(SEED),--seed '$(SEED)')

@@ -16,7 +16,10 @@ from openecho.study import comparison
 
 README = ROOT / "README.md"
 PICTURE = ROOT / "docs" / "core.png"
-MAKERS = ("make sim", "make precision", "make synth CLOCK=1", "make score DATA=gedi_cerrado.npz", "make bench")
+MAKERS = (
+    *("make sim", "make precision", "make synth CLOCK=1"),
+    *("make score DATA=gedi_cerrado.npz", "make bench", "make scenes"),
+)
 """What makes the reports."""
 WAVEFORMS = 1000
 """A point, of the benchmark whose figures are worth printing."""
@@ -234,6 +237,25 @@ def _found(result: dict[str, Any]) -> str:
     return f"{result['found']:.0%}" + (f", {result['centre']:.2f}" if result["found"] > 0.5 else "")
 
 
+def scenes(content: dict[str, Any]) -> list[str]:
+    """What each method finds of every bundled scene, and how far its plan is from full fidelity."""
+    methods = [name for name in content["methods"][0] if name not in ("scene", "waveforms", "echoes")]
+    plans = {row["scene"]: row for row in content["fidelity"]}
+    rows = []
+    for row in content["methods"]:
+        planned = plans[row["scene"]]
+        rays = f"{planned['rays']:,.0f}", f"{planned['largest_difference']:.2f}"
+        echoes = row["echoes"] / row["waveforms"]
+        rows.append((row["scene"], f"{echoes:.2f}", *(_judged(row[name]) for name in methods), *rays))
+    head = ("scene", "echoes/waveform", *methods, "rays/waveform", "largest difference/tolerance")
+    return table(head, rows)
+
+
+def _judged(found: dict[str, Any]) -> str:
+    """Share of echoes found, error of those in bins, and share of the grounds found."""
+    return f"{found['within_3']:.0%}, {found['peak_rms']:.2f}, {found['ground_within_3']:.0%}"
+
+
 PARTS: dict[str, tuple[str | None, Callable[[dict[str, Any]], list[str]]]] = {
     "modules": ("sim", modules),
     "units": ("sim", units),
@@ -242,6 +264,7 @@ PARTS: dict[str, tuple[str | None, Callable[[dict[str, Any]], list[str]]]] = {
     "columns": (None, columns),
     "recall": ("score", recall),
     "fits": ("bench", fits),
+    "scenes": ("scenes", scenes),
     "differences": ("core_vs_float64", differences),
     "echoes": ("core_vs_float64", echoes),
 }

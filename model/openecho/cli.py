@@ -392,6 +392,27 @@ def plan_scene(scene: Any, fidelity: str, rays: int | None) -> None:
         console.print(part)
 
 
+@scene.command("view")
+@SCENE
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    callback=in_folder,
+    help="Picture to write: .png, .svg, .pdf.  [default: a window]",
+)
+@click.option("--waveforms", type=click.IntRange(1, 12), default=4, show_default=True, help="How many to draw.")
+def view_scene(scene: Any, output: Path | None, waveforms: int) -> None:
+    """Draw SCENE: heights with the beams on them, one scan from the side, and a few waveforms with their truth."""
+    with _naming(scene):
+        drawn = _scenes("openecho.study.scene_view").draw(scene.scene, waveforms)
+    if output is None:
+        figure.show(drawn)
+    else:
+        figure.save(drawn, output)
+        click.echo(f"{output}: {scene.name}")
+
+
 @openecho.command()
 @SCENE
 @click.option(

@@ -159,8 +159,8 @@ def test_the_command_says_what_it_made_and_from_which_seed(run: Run, tmp_path: P
 def test_a_plan_is_printed_with_every_effect_and_its_cost(run: Run) -> None:
     status, out, _ = run("scene", "plan", "ice")
     assert status == 0
-    assert re.search(r"extinction +\d+ +yes +an exponential a step of range", out)
-    assert re.search(r"speckle +0 +no ", out)
+    assert re.search(r"extinction +\d+ +[\d.]+ +yes +an exponential", out)
+    assert re.search(r"speckle +0 +0 +no ", out)
     assert re.search(r"smooth, of closed form +100\.0% +0\.0%", out)
 
 

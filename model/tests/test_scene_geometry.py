@@ -76,7 +76,7 @@ class Met(NamedTuple):
 def unit(vector: ArrayLike) -> Floats:
     """The same direction."""
     vector = np.asarray(vector, np.float64)
-    return vector / np.linalg.norm(vector)
+    return np.asarray(vector / np.linalg.norm(vector))
 
 
 def meet(world: World, origin: ArrayLike, direction: ArrayLike) -> Met:
@@ -223,16 +223,16 @@ def test_a_platform_flies_along_its_heading_from_its_start() -> None:
 # The footprint
 
 
-@pytest.mark.parametrize("count", [64, 4096])
+@pytest.mark.parametrize("count", [64, 256, 1024, 4096])
 @pytest.mark.parametrize("cut", [1.0, 2.0, 4.0])
 def test_rays_have_the_moments_of_the_light_within_the_field_of_view(count: int, cut: float) -> None:
-    found = footprint.rays(count, cut)
+    found = footprint.rays(4096, cut)[:count]
     energy = quad(lambda r: 4 * r * math.exp(-2 * r**2), 0, cut)[0]
     square = quad(lambda r: 4 * r**3 * math.exp(-2 * r**2), 0, cut)[0] / energy / 2
     assert footprint.seen(cut) == pytest.approx(energy, rel=1e-12)
     assert np.hypot(*found.T).max() <= cut
-    assert (found**2).mean(axis=0) == pytest.approx([square, square], rel=0.01)
-    assert abs(found.mean(axis=0)).max() < 0.5 / math.sqrt(count) / 4
+    assert (found**2).mean(axis=0) == pytest.approx([square, square], rel=4 / count + 0.002)
+    assert abs(found.mean(axis=0)).max() < 0.1 / math.sqrt(count)
     if cut == 4:
         assert square == pytest.approx(0.25, rel=1e-9)
 
@@ -356,12 +356,9 @@ def test_stairs_have_treads_and_risers() -> None:
     ).world
     for k in range(4):
         for x in (1.01 + 3 * k, 3.99 + 3 * k):
-            found = meet(world, (x, 4.99, 100), DOWN)
-            assert found == pytest.approx((100 - 5 - 2 * (k + 1), 1, 0, k))
-            riser = meet(
-                world, (-50, -4.99, 5 + 2 * k + x - 1 - 3 * k - 1e-3 if x - 1 - 3 * k < 2 else 6.5 + 2 * k), (1, 0, 0)
-            )
-            assert riser == pytest.approx((51 + 3 * k, 1, 0, 4 + k))
+            assert meet(world, (x, 4.99, 100), DOWN) == pytest.approx((95 - 2 * (k + 1), 1, 0, k))
+        for z in (5.01 + 2 * k, 6.99 + 2 * k):
+            assert meet(world, (-50, -4.99, z), (1, 0, 0)) == pytest.approx((51 + 3 * k, 1, 0, 4 + k))
     assert all(
         math.isinf(meet(world, (x, y, 100), DOWN).range) for x, y in ((0.99, 0), (13.01, 0), (5, 5.01), (5, -5.01))
     )
@@ -449,6 +446,20 @@ def test_rays_meet_hills_where_marching_along_them_does() -> None:
     assert 120 < hit < 200
 
 
+def test_no_ray_slips_through_between_two_cells() -> None:
+    z = hills(32, 4, 1.0)  # no slope is as steep as the rays
+    world = grids((z, 0.0, 0.0, 1.0, False))
+    rng = np.random.default_rng(10)
+    for turn in range(5000):
+        place = rng.integers(1, 31, 2).astype(float)
+        place[turn % 2] += rng.random() * (turn % 3 > 0)  # on an edge of a cell, or on a corner
+        point = np.array([*place, bilinear(z, place[:1], place[1:])[0]])
+        away, tilt, azimuth = rng.uniform(20, 900), math.radians(rng.uniform(0, 30)), rng.uniform(0, 2 * math.pi)
+        way = np.array([math.sin(tilt) * math.sin(azimuth), math.sin(tilt) * math.cos(azimuth), -math.cos(tilt)])
+        found = meet(world, point - away * way, way)
+        assert found.range == pytest.approx(away, abs=1e-6), turn
+
+
 def test_a_ray_straight_down_meets_the_height_between_the_corners() -> None:
     z = np.array([[1.0, 3], [5, 13]])
     world = grids((z, 10.0, 20.0, 4.0, False))
@@ -485,8 +496,8 @@ def test_a_ray_passes_where_there_are_no_heights() -> None:
 def test_a_grid_that_repeats_is_the_same_laid_side_by_side() -> None:
     z = hills(16, 7, 2.0)
     once = grids((z, 5.0, -3.0, 1.0, True))
-    tiled = np.pad(np.tile(z[:-1, :-1], (9, 9)), ((0, 1), (0, 1)), "wrap")
-    wide = grids((tiled, 5.0 - 4 * 16, -3.0 - 4 * 16, 1.0, False))
+    tiled = np.pad(np.tile(z[:-1, :-1], (15, 15)), ((0, 1), (0, 1)), "wrap")
+    wide = grids((tiled, 5.0 - 7 * 16, -3.0 - 7 * 16, 1.0, False))
     rng = np.random.default_rng(8)
     for _ in range(200):
         origin = np.array([*(rng.random(2) * 40 - 20), 6.0])
@@ -556,7 +567,7 @@ def test_ways_through_crowns_are_those_of_points_along_rays(shape: str) -> None:
     step = 5e-3
     t = np.arange(step / 2, 120, step)
     met = 0
-    for turn in range(60):
+    for turn in range(300):
         if turn % 3 == 0:  # through the wood, level or nearly so, from aside or from within
             origin = np.array([*rng.uniform(-40, 40, 2), rng.uniform(1, 24)])
             way = unit([*rng.standard_normal(2), (0, 0.05, -0.3)[turn // 3 % 3]])
@@ -670,10 +681,10 @@ def test_relief_is_laid_around_its_position() -> None:
     assert (found.z == 700).all()
 
 
-def test_edges_of_relief_know_nothing_of_each_other() -> None:
-    z = np.array([random_heights.relief(relief(), seed).z for seed in range(40)]) / 3
-    assert abs((z[:, :, 0] * z[:, :, -1]).mean()) < 0.1
-    assert abs((z[:, 0] * z[:, -1]).mean()) < 0.1
+def test_edges_of_relief_are_no_more_alike_than_places_two_correlation_lengths_apart() -> None:
+    z = np.array([random_heights.relief(relief(), seed).z for seed in range(60)]) / 3
+    for products in ((z[:, :, 0] * z[:, :, -1]).mean(axis=1), (z[:, 0] * z[:, -1]).mean(axis=1)):
+        assert products.mean() < math.exp(-2) + 3 * products.std() / math.sqrt(60)
 
 
 @pytest.mark.parametrize("seed", [3, [1, 2]])
@@ -689,7 +700,7 @@ def test_the_variance_of_a_sea_is_that_of_its_spectrum(wind: float) -> None:
     fields = [random_heights.sea(waves(wind, level="2 m", direction="30 deg"), seed) for seed in range(12)]
     tile = [heights.z[:-1, :-1] for heights, _ in fields]
     cell = fields[0][0].cell
-    least = 0.74 * (GRAVITY / ((1.026 * wind) ** 2 * 2 * math.pi / (8 * cell))) ** 2
+    least = 0.74 * (GRAVITY / ((1.026 * wind) ** 2 * 2 * math.pi / (random_heights.SHORTEST * cell))) ** 2
     expected = 0.0081 * (1.026 * wind) ** 4 / (4 * 0.74 * GRAVITY**2) * math.exp(-least)
     square = np.array([((z - 2) ** 2).mean() for z in tile])
     assert abs(square.mean() - expected) < 5 * square.std() / math.sqrt(12)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from openecho.scene.geometry.flight import beams
 from openecho.scene.geometry.world import Built
-from openecho.scene.instrument import EFFECTS, Instrument, instrument
+from openecho.scene.instrument import EFFECTS, NOISES, Instrument, instrument
 from openecho.scene.physics import receiver
 from openecho.scene.returns import Rays, Returned, distance, returns
 from openecho.scene.schema import Scene
@@ -20,12 +20,15 @@ FIDELITIES = ("plan", "full")
 """As much as the scene requires; or every effect and all rays, to see what the first leaves out."""
 
 MOST_RAYS = 2**12
-"""Of a beam: with so many, an edge through a footprint is where it is to a share of 1e-3 of its light."""
+"""Of a beam: an edge through a footprint then shares its light out to 2e-3, which only brighter echoes show."""
 
 PILOTS = 64
 """Shots, from all over the flight, that tell how bright its echoes are."""
 
 PILOT_RAYS = 256
+
+DARK = {*NOISES[:3], "background light"}
+"""Effects that are as great without an echo."""
 
 MARGIN = 2.0
 """The scene's brightest echo over the brightest that the pilots saw."""
@@ -41,6 +44,8 @@ class Effect:
         Of `openecho.scene.instrument.EFFECTS`.
     counts : float
         As much as it can move a count: the greatest shift, or the deviation of what is random.
+    share : float
+        That over the tolerance where it does so: an echo's own noise hides more than the darkness before it.
     cost : str
         Of modelling it.
     kept : bool
@@ -49,6 +54,7 @@ class Effect:
 
     name: str
     counts: float
+    share: float
     cost: str
     kept: bool
 
@@ -60,11 +66,11 @@ class Plan:
     Attributes
     ----------
     effects : tuple of Effect
-        The largest first.
+        Those that matter most first.
     rays : Rays
         How footprints are sampled.
     tolerance : float
-        Counts that everything left out comes to at most, where there is no light.
+        Counts that all that is left out comes to at most where there is no light.
     noise : float
         Its deviation without light, counts.
     peak : float
@@ -105,7 +111,8 @@ class Pilot:
 def plan(scene: Scene, built: Built, fidelity: str = "plan", rays: int | None = None) -> Plan:
     """Work out what a scene requires.
 
-    Effects are left out from the smallest on, as long as all that are left out come to no more than the tolerance.
+    Effects are left out from those that matter least on, as long as all that are left out come to no more than the
+    tolerance together.
 
     Parameters
     ----------
@@ -126,13 +133,17 @@ def plan(scene: Scene, built: Built, fidelity: str = "plan", rays: int | None = 
     few = Rays(PILOT_RAYS, True, scene.tolerance)
     seen = returns(built, whole, beams(scene, _pilots(scene)), few)
     peak = min(MARGIN * float(seen.waveform.max()), 2.0**scene.digitiser.bits - 1 - scene.digitiser.offset)
-    tolerance = float(scene.tolerance.allowed(np.array(whole.dark)))
+    dim, bright = scene.tolerance.allowed(whole.dark + whole.shot * np.array([0, peak])).tolist()
     effects, left_out = [], 0.0
-    for name, (counts, cost) in sorted(_estimates(whole, seen, peak).items(), key=lambda item: item[1][0]):
-        left_out += counts
-        effects.append(Effect(name, counts, cost, fidelity == "full" or left_out > tolerance))
+    # What grows with the light grows faster than its noise: where an echo is brightest, it matters most.
+    estimates = _estimates(whole, seen, peak)
+    shares = {name: counts / (dim if name in DARK else bright) for name, (counts, _) in estimates.items()}
+    for name, share in sorted(shares.items(), key=lambda item: item[1]):
+        counts, cost = estimates[name]
+        left_out += share
+        effects.append(Effect(name, counts, share, cost, fidelity == "full" or left_out > 1))
     sampling = Rays(rays or MOST_RAYS, fidelity == "plan" and rays is None, scene.tolerance)
-    return Plan(tuple(reversed(effects)), sampling, tolerance, math.sqrt(whole.dark), peak)
+    return Plan(tuple(reversed(effects)), sampling, dim, math.sqrt(whole.dark), peak)
 
 
 def pilot(scene: Scene, built: Built, chosen: Plan) -> Pilot:

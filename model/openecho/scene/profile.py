@@ -7,12 +7,15 @@ import math
 import numpy as np
 
 from openecho.compiled import njit
-from openecho.scene.geometry.trace import NOWHERE, crowns, surface
+from openecho.scene.geometry.trace import CYLINDER, NOWHERE, crowns, surface
 from openecho.scene.physics.pulse import STEPS
 from openecho.scene.physics.reflection import backscatter
 
 PIECE = 0.5
 """Bins, of a ray's way through leaves that are laid down as one."""
+
+LEAFY, WALLED = -2, -3
+"""Target of a probe with leaves before it; of a crown with upright walls, which begin at once."""
 
 SPREAD = 6.0
 """Deviations to which a smooth footprint is laid down."""
@@ -74,7 +77,7 @@ def probe(begin, end, world, origin, aim, triangles, ranges, cosines, light, own
     light : float64 (n, k)
         Filled with what it sends back, 1/sr; 0 where there is none.
     owner : int64 (n, k, 2)
-        Filled with its target and object; target -2 where leaves are before it.
+        Filled with its target and object; target `LEAFY` or `WALLED` where leaves are before it.
     first : float64 (n,)
         Filled with where the nearest ray meets anything, m; infinite if none does.
     """
@@ -103,12 +106,9 @@ def probe(begin, end, world, origin, aim, triangles, ranges, cosines, light, own
                 light[i, j] = _back(reflectance, target, cosine)
             first[i] = min(first[i], far)
             for k in range(count):
-                owner[i, j, 0] = LEAFY
+                walled = owner[i, j, 0] == WALLED or crown[which[k], 5] == CYLINDER
+                owner[i, j, 0] = WALLED if walled else LEAFY
                 first[i] = min(first[i], enters[k])
-
-
-LEAFY = -2
-"""Target of a ray with leaves before it."""
 
 
 @njit(nogil=True, inline="always")

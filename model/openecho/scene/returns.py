@@ -14,7 +14,7 @@ from openecho.scene.geometry.flight import Beams
 from openecho.scene.geometry.trace import NOWHERE
 from openecho.scene.geometry.world import Built
 from openecho.scene.instrument import Instrument
-from openecho.scene.profile import LEAFY, fan, fold, lay, probe, settle, smear
+from openecho.scene.profile import LEAFY, WALLED, fan, fold, lay, probe, settle, smear
 from openecho.scene.schema import LEAD, Tolerance
 
 Floats = NDArray[np.float64]
@@ -223,12 +223,13 @@ class _Tracer:
 
     def _edged(self) -> Bools:
         """Whether an edge goes through a footprint: how much lies beyond it only all rays can tell."""
-        bare = (self.owner[:, :, 0] != LEAFY).all(axis=1)
+        bare = (self.owner[:, :, 0] > LEAFY).all(axis=1)
+        walled = self.owner[:, :, 0] == WALLED
         met = np.isfinite(self.ranges).all(axis=1)
         bent = self._bent(np.where(np.isfinite(self.ranges), self.ranges, 0.0))
         jumps = abs(bent).max(axis=1) > JUMP * self.radius * distance(self.instrument, self.beams)
-        edged: Bools = bare & (~self._alike() | ~met | jumps)
-        return edged
+        begins = walled.any(axis=1) & ~walled.all(axis=1)
+        return np.asarray(begins | (bare & (~self._alike() | ~met | jumps)), np.bool_)
 
     def _bent(self, ranges: Floats) -> Floats:
         """How far probes are from the plane through all of them, m."""
@@ -238,44 +239,35 @@ class _Tracer:
 
     def _trace(self, rows: Ints, waveform: Floats, speckled: Floats, owners: Ints, sums: Floats, count: Ints) -> bool:
         """Fill some rows, ray by ray; False if one has no room for what its beam met."""
-        instrument, origin = self.instrument, self.origin[rows]
-        profile = np.zeros((len(rows), instrument.steps))
-        mine = np.zeros((len(rows), waveform.shape[1]))
-        before = np.zeros_like(mine)
+        instrument, origin, every = self.instrument, self.origin[rows], np.arange(len(rows))
+        profile, mine = np.zeros((len(rows), instrument.steps)), np.zeros((len(rows), waveform.shape[1]))
         met, back, full = owners[rows], sums[rows], np.zeros(len(rows), np.bool_)
-        edged, leafy = self._edged()[rows], (self.owner[rows, :, 0] == LEAFY).any(axis=1)
+        place = origin, instrument.step, profile, met, back, full
         points, even = footprint.rays(self.rays.most, instrument.cut), self._even()
-        left, once = np.arange(len(rows)), np.zeros(len(rows), np.bool_)
+        edged, leafy = self._edged()[rows], (self.owner[rows, :, 0] <= LEAFY).any(axis=1)
+        left, once = every, np.zeros(len(rows), np.bool_)
         begin, end = 0, min(FEWEST, self.rays.most) if self.rays.adaptive else self.rays.most
-        while True:
-            aim = self._fan(rows[left], points[begin:end])
+        while len(left):
+            aim, beam = self._fan(rows[left], points[begin:end]), self.beams.origin[rows[left]]
             triangles = self._triangles(rows[left], aim)
-            place = origin, instrument.step, profile, met, back, full
-            share(
-                lay, len(left), left, self.built.world, self.beams.origin[rows[left]], aim, triangles, *place, worth=1
-            )
+            share(lay, len(left), left, self.built.world, beam, aim, triangles, *place, worth=1)
             if full.any():
                 return False
-            before[left] = mine[left]
+            before = mine.copy()
             share(fold, len(left), left, profile, origin, instrument.shape, even, mine)
             count[rows[left]] = end
             if end == self.rays.most:
                 break
-            if begin:
-                # Leaves that a probe saw are still to come if no ray has met any.
-                unseen = leafy[left] & (met[left, :, 2] != 1).all(axis=1)
-                again = self._settled(left, before, mine, end)
-                still = again & once[left] & ~unseen & ~edged[left]
-                once[left] = again
-                left = left[~still]
-                if not len(left):
-                    break
+            # Leaves that a probe saw are still to come if no ray has met any; and one agreement may be chance.
+            unseen = leafy & (met[:, :, 2] != 1).all(axis=1)
+            agreed = self._agreed(left, before, mine, end)
+            left, once = left[(edged | unseen | ~agreed | ~once)[left]], agreed
             begin, end = end, 2 * end
         each = footprint.seen(instrument.cut) / count[rows]
         waveform[rows] = mine * each[:, None]
         owners[rows], sums[rows] = met, back * each[:, None, None]
         if self.grain is not None:
-            share(fold, len(rows), np.arange(len(rows)), profile, origin, instrument.shape, self.grain[rows], mine)
+            share(fold, len(rows), every, profile, origin, instrument.shape, self.grain[rows], mine)
             speckled[rows] = mine * each[:, None]
         return True
 
@@ -300,12 +292,13 @@ class _Tracer:
         columns = ranges, cosine, caster.target[triangle], caster.object[triangle]
         return tuple(column.reshape(shape) for column in columns)  # type: ignore[return-value]
 
-    def _settled(self, rows: Ints, before: Floats, now: Floats, count: int) -> Bools:
-        """Which of some waveforms have settled, sums over `count` rays."""
+    def _agreed(self, rows: Ints, before: Floats, now: Floats, count: int) -> Bools:
+        """Which waveforms, sums over `count` rays, twice as many rays have left as they were."""
         instrument, tolerance = self.instrument, self.rays.tolerance
-        settled = np.zeros(len(now), np.bool_)
-        counts = footprint.seen(instrument.cut) * instrument.light / count
-        variance = instrument.dark, instrument.shot
-        least = SETTLED * tolerance.counts, SETTLED * tolerance.noise
-        share(settle, len(rows), rows, before, now, counts, variance, *least, settled)
-        return settled[rows]
+        agreed = np.zeros(len(now), np.bool_)
+        if count > FEWEST:
+            counts = footprint.seen(instrument.cut) * instrument.light / count
+            variance = instrument.dark, instrument.shot
+            least = SETTLED * tolerance.counts, SETTLED * tolerance.noise
+            share(settle, len(rows), rows, before, now, counts, variance, *least, agreed)
+        return agreed

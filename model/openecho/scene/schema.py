@@ -252,7 +252,7 @@ class Atmosphere(Section):
 
 
 class Tolerance(Section):
-    """How far a waveform may be off for want of rays through its footprint: the greater of both."""
+    """How far a waveform may be off full fidelity, for want of rays and of effects: the greater of both."""
 
     counts: Annotated[float, Quantity(units.COUNTS, 0)] = Field(
         default=0.5, description="as much as rounding may change"

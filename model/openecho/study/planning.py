@@ -46,10 +46,11 @@ def tables(found: Planned) -> list[Table]:
 def _effects(chosen: Plan) -> Table:
     title = f"an echo of up to {chosen.peak:.0f} counts, noise {chosen.noise:.2f}, tolerance {chosen.tolerance:.2f}"
     table = Table(box=box.SIMPLE, title=title, title_justify="left")
-    for name in ("effect", "counts", "modelled", "cost"):
-        table.add_column(name, justify="right" if name == "counts" else "left")
+    for name in ("effect", "counts", "tolerances", "modelled", "cost"):
+        table.add_column(name, justify="right" if name in ("counts", "tolerances") else "left")
     for effect in chosen.effects:
-        table.add_row(effect.name, f"{effect.counts:.3g}", "yes" if effect.kept else "no", effect.cost)
+        amounts = f"{effect.counts:.3g}", f"{effect.share:.3g}"
+        table.add_row(effect.name, *amounts, "yes" if effect.kept else "no", effect.cost)
     return table
 
 

@@ -13,6 +13,10 @@ Floats = NDArray[np.float64]
 NODES = 6
 """Of the Gauss–Hermite rule on each axis: exact for the mean and the variance of a surface of fifth degree."""
 
+BITS = 30
+THIRD = (2**BITS - 1) // 3
+"""Digits of the rays, and those of 1/3."""
+
 RING = 2.0
 """Radius of the ring of guards in those of the footprint: e^-8 of the energy is further out."""
 
@@ -28,7 +32,8 @@ def seen(cut: float) -> float:
 def rays(count: int, cut: float) -> Floats:
     """Points of equal energy in a Gaussian footprint.
 
-    Sobol's sequence, mapped by the inverse of 1 - exp(-2r²): every prefix of a power of two covers all of it.
+    Sobol's sequence, mapped by the inverse of 1 - exp(-2r²): every prefix of a power of two covers all of it. A digital
+    shift by 1/3 puts the points of each prefix at a third or two of their cells, where they would be on their edges.
 
     Parameters
     ----------
@@ -42,7 +47,8 @@ def rays(count: int, cut: float) -> Floats:
     float64 (count, 2)
         In radii of the footprint.
     """
-    share, turn = (qmc.Sobol(2, scramble=False).random(count) + 0.5 / count).T
+    cells = (qmc.Sobol(2, scramble=False, bits=BITS).random(count) * 2**BITS).astype(np.int64)
+    share, turn = (((cells ^ THIRD) + 0.5) / 2**BITS).T
     radius = np.sqrt(-0.5 * np.log1p(-share * seen(cut)))
     return np.stack([radius * np.cos(2 * np.pi * turn), radius * np.sin(2 * np.pi * turn)], axis=1)
 

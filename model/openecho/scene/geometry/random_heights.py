@@ -14,6 +14,9 @@ from openecho.scene.schema import Relief, Sea
 Floats = NDArray[np.float64]
 Seed = int | list[int]
 
+APART = 5
+"""Correlation lengths after which heights have less than a hundredth in common."""
+
 SIDE = 1024
 """Cells of a side of the sea's tile, which repeats."""
 
@@ -31,7 +34,7 @@ def relief(given: Relief, seed: Seed) -> Heights:
     """Heights of a normal field with the spectrum (1 + k²L²)^-(H + 1), H the Hurst exponent.
 
     Th. von Kármán, Proc. Natl. Acad. Sci. 34, 530 (1948); in two dimensions J. A. Goff & T. H. Jordan, J. Geophys. Res.
-    93, 13589 (1988). Made on a circle wider by 2L than what is kept, so that its edges know nothing of each other.
+    93, 13589 (1988). Made on a circle wider by `APART` L than what is kept: its opposite edges are as far apart.
 
     Parameters
     ----------
@@ -44,7 +47,7 @@ def relief(given: Relief, seed: Seed) -> Heights:
     Heights
     """
     shape = points(given)
-    circle = tuple(2 * math.ceil((side + 2 * given.correlation_length / given.cell) / 2) for side in shape)
+    circle = tuple(2 * math.ceil((side + APART * given.correlation_length / given.cell) / 2) for side in shape)
     k = _wavenumber(circle, given.cell)
     hurst = 1 - given.roughness
     spectrum = (1 + (k * given.correlation_length) ** 2) ** -(hurst + 1)

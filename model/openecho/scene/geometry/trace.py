@@ -14,6 +14,9 @@ NOWHERE = -1
 PLANE, STAIRS, BALL, GRID = range(4)
 """Kinds of surface."""
 
+ELLIPSOID, CONE, CYLINDER = range(3)
+"""Shapes of crowns."""
+
 SHELL = 1e-6
 """m: what is nearer is where the ray comes from."""
 
@@ -304,13 +307,13 @@ def _crown(crown, i, ox, oy, oz, dx, dy, dz):  # type: ignore[no-untyped-def]
     middle = 0.5 * (enter + leave) if leave < math.inf else enter
     x, y, z = ox + middle * dx - crown[i, 0], oy + middle * dy - crown[i, 1], oz + middle * dz
     flat, slant, out = dx * dx + dy * dy, x * dx + y * dy, x * x + y * y
-    if crown[i, 5] == 2.0:  # cylinder
+    if crown[i, 5] == CYLINDER:
         a, b, c = flat, slant, out - radius * radius
-    elif crown[i, 5] == 1.0:  # cone, its top at `top`
+    elif crown[i, 5] == CONE:  # its top at `top`
         slope = (radius / (top - base)) ** 2
         down = top - z
         a, b, c = flat - slope * dz * dz, slant + slope * down * dz, out - slope * down * down
-    else:  # ellipsoid
+    else:  # an ellipsoid
         half = 0.5 * (top - base)
         slope = (radius / half) ** 2
         up = z - 0.5 * (base + top)

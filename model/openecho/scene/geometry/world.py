@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from openecho.scene import schema
 from openecho.scene.geometry import flight, random_heights
 from openecho.scene.geometry.height_maps import Heights, enough_memory, read_map
-from openecho.scene.geometry.trace import BALL, GRID, PLANE, STAIRS, below
+from openecho.scene.geometry.trace import BALL, CONE, CYLINDER, ELLIPSOID, GRID, PLANE, STAIRS, below
 from openecho.scene.geometry.triangles import Caster, Mesh, houses, read_mesh
 from openecho.scene.physics.reflection import leaf_backscatter, sea_facets
 
@@ -45,8 +45,8 @@ GRAZING = 0.01
 GROUND = ("plane", "terraces", "terrain")
 """Kinds of target that trees stand on."""
 
-SHAPES = ("ellipsoid", "cone", "cylinder")
-"""Of crowns, by number."""
+SHAPES = {"ellipsoid": ELLIPSOID, "cone": CONE, "cylinder": CYLINDER}
+"""Of crowns."""
 
 
 class World(NamedTuple):
@@ -214,7 +214,7 @@ class _Builder:
         else:
             assert terrain.relief is not None
             rows, columns = random_heights.points(terrain.relief)
-            around = 2 * terrain.relief.correlation_length / terrain.relief.cell
+            around = random_heights.APART * terrain.relief.correlation_length / terrain.relief.cell
             what = f"{rows} × {columns} heights"
             enough_memory(f"{key}.relief.cell", what, HEIGHT_BYTES * (rows + around) * (columns + around))
             heights = random_heights.relief(terrain.relief, self._seed(terrain.relief.seed, number))
@@ -257,7 +257,7 @@ class _Builder:
 
     def _tree(self, tree: schema.Tree, number: int) -> None:
         x, y, z = tree.position
-        shape, leaves = SHAPES.index(tree.crown), PROJECTION * tree.leaf_area_density
+        shape, leaves = SHAPES[tree.crown], PROJECTION * tree.leaf_area_density
         edges = z + tree.crown_base, z + tree.height
         self.crowns.append(np.array([(x, y, *edges, tree.crown_width / 2, shape, leaves, number, 0)]))
 
@@ -281,7 +281,7 @@ class _Builder:
         crowns[:, :2] = place
         crowns[:, 2], crowns[:, 3] = foot + stand.crown_base * tall, foot + tall
         crowns[:, 4] = stand.crown_width * tall / 2
-        crowns[:, 5:8] = SHAPES.index(stand.crown), PROJECTION * stand.leaf_area_density, number
+        crowns[:, 5:8] = SHAPES[stand.crown], PROJECTION * stand.leaf_area_density, number
         crowns[:, 8] = tree
         self.crowns.append(crowns)
 
