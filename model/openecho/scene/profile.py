@@ -42,7 +42,7 @@ def fan(begin, end, direction, radius, turn, points, aim):  # type: ignore[no-un
     """
     for i in range(begin, end):
         dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]
-        # Two vectors across the beam: J. R. Frisvad, J. Graphics Tools 16, 151 (2012), away from its pole.
+        # Two vectors across the beam: T. Duff et al., J. Computer Graphics Techniques 6, 1 (2017).
         sign = math.copysign(1.0, dz)
         a = -1.0 / (sign + dz)
         b = dx * dy * a

@@ -158,7 +158,7 @@ def simulate(ready: Simulator, first: int, shots: int) -> Simulated:
 
 
 def _random(scene: Scene, first: int, stream: int) -> np.random.Generator:
-    """Random numbers of a block; those of targets begin with a 1."""
+    """Random numbers of a block; those of targets have a 1 where these have a 2."""
     return np.random.default_rng([scene.seed, 2, first, stream])
 
 

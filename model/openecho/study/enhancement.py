@@ -27,14 +27,13 @@ from openecho.decompose import criteria
 from openecho.enhance import accumulate, gaussian, moving_average, snr_db, vondrak
 from openecho.enhance.noise import noise
 from openecho.enhance.wavelet import LEVELS, denoise
+from openecho.scene.physics.pulse import FWHM_TAU
 from openecho.study.figure import FILTERED, FOUND, RAW, SUM, save
 
 FloatArray = NDArray[np.float64]
 
 FWHM = 20.0
 """Bins, of every echo: in Fig 10 the pulse's surroundings are samples 226 to 246."""
-FWHM_TAU = 3.394701
-"""FWHM of the laser's pulse in τ, between the roots 0.7598 and 4.1545 of u² exp(-u) = 2 exp(-2); printed as 3.5."""
 TAU = FWHM / FWHM_TAU
 """τ of the laser's pulse, bins."""
 SIGMA = FWHM / np.sqrt(8 * np.log(2))

@@ -176,7 +176,7 @@ class _Builder:
 
     def _seed(self, given: int | None, number: int) -> random_heights.Seed:
         """That of a target; those that have none of their own differ."""
-        return [self.scene.seed, number] if given is None else given
+        return [self.scene.seed, 1, number] if given is None else given
 
     def _reflect(self, number: int, reflectance: schema.Reflectance, facets: float | None = None) -> None:
         slope = reflectance.facet_slope**2 if facets is None and reflectance.facet_slope else facets or 1.0
