@@ -244,7 +244,7 @@ def test_bundled_scenes_are_listed_with_what_they_show(run: Run) -> None:
     status, out, err = run("scene", "list")
     assert (status, err) == (0, "")
     names = [line.split()[0] for line in out.splitlines()]
-    assert names == ["forest", "ice", "mountain", "roofs", "sea", "slope", "terraces", "woodland"]
+    assert names == ["forest", "ice", "mountain", "roofs", "savanna", "sea", "slope", "terraces", "woodland"]
     assert all(len(line.split()) > 3 for line in out.splitlines())
 
 

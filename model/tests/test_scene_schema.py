@@ -114,7 +114,7 @@ def refusal(text: str, path: Path = HERE) -> str:
 
 
 def test_every_bundled_scene_loads_by_name_and_says_what_it_shows() -> None:
-    assert list(bundled()) == ["forest", "ice", "mountain", "roofs", "sea", "slope", "terraces", "woodland"]
+    assert list(bundled()) == ["forest", "ice", "mountain", "roofs", "savanna", "sea", "slope", "terraces", "woodland"]
     for name, description in bundled().items():
         assert load(name).description == description
         assert 20 < len(description) < 100
