@@ -130,7 +130,8 @@ def _method(name: str, ready: Simulator, longest: int) -> Method:
         return prepare(name, longest, {"taps": "nasa3.5" if chain.deviation < NARROW else "gedi", "k": 4.0})
     # The response's autocorrelation, exp(-t²/4σ²) with σ = √(ln 2)/(2πB).
     lag = np.arange(LAGS) / rate * math.pi * ready.scene.receiver.bandwidth / math.sqrt(math.log(2))
-    width, misfit = shaped(chain, normal if name == "gaussian" else asymmetric)
+    # To digits that no machine rounds differently: an echo more or less may hang on the last.
+    width, misfit = (round(value, 4) for value in shaped(chain, normal if name == "gaussian" else asymmetric))
     known = {"width": width, "correlation": tuple(np.exp(-(lag**2)).tolist()), "misfit": max(misfit, MISFIT)}
     return prepare(name, longest, known)
 
