@@ -49,6 +49,15 @@ def in_folder(_: click.Context, __: click.Parameter, output: Path | None) -> Pat
     return output
 
 
+PICTURE = click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    callback=in_folder,
+    help="Picture to write: .png, .svg, .pdf.  [default: a window]",
+)
+
+
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="openecho")
 def openecho() -> None:
@@ -265,13 +274,7 @@ def decompose(
 @openecho.command()
 @RECORDING
 @click.option("--waveform", type=click.IntRange(0), required=True, help="Which, from 0.")
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    callback=in_folder,
-    help="Picture to write: .png, .svg, .pdf.  [default: a window]",
-)
+@PICTURE
 @METHOD
 @settings()
 def plot(file: Path, waveform: int, output: Path | None, method: str, **chosen: Any) -> None:
@@ -382,7 +385,8 @@ RAYS = click.option(
 def plan_scene(scene: Any, fidelity: str, rays: int | None) -> None:
     """Say what simulating SCENE requires: effects, rays, targets in reach, and time; and why.
 
-    An effect is left out if it and all smaller ones can move no count by more than the scene's tolerance.
+    Effects are left out from those that matter least on, as long as all that are left out together move no count by
+    more than the scene's tolerance.
     """
     with _naming(scene):
         planning = _scenes("openecho.study.planning")
@@ -394,13 +398,7 @@ def plan_scene(scene: Any, fidelity: str, rays: int | None) -> None:
 
 @scene.command("view")
 @SCENE
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    callback=in_folder,
-    help="Picture to write: .png, .svg, .pdf.  [default: a window]",
-)
+@PICTURE
 @click.option("--waveforms", type=click.IntRange(1, 12), default=4, show_default=True, help="How many to draw.")
 def view_scene(scene: Any, output: Path | None, waveforms: int) -> None:
     """Draw SCENE: heights with the beams on them, one scan from the side, and a few waveforms with their truth."""
@@ -443,8 +441,9 @@ def simulate(
     """
     if jobs is not None and scheduler is not None:
         raise click.UsageError("found --jobs and --scheduler, expected one of them: a cluster has its own workers")
-    chosen = {"shots": shots, "seed": seed}
-    world = scene.scene.model_copy(update={name: value for name, value in chosen.items() if value is not None})
+    chosen = {name: value for name, value in (("shots", shots), ("seed", seed)) if value is not None}
+    with _naming(scene):
+        world = _scenes().changed(scene.scene, **chosen)
     simulation = _scenes("openecho.batch.simulate")
     job = simulation.Simulation(world, output, fidelity, rays, noiseless, jobs or 1, scheduler)
     try:

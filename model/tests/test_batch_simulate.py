@@ -15,7 +15,9 @@ import pytest
 import yaml
 
 from openecho import formats
+from openecho.batch import StoreError
 from openecho.batch.simulate import Simulation, simulate_file
+from openecho.formats import writers
 from openecho.formats.references import references
 from openecho.scene import simulate
 from openecho.scene.geometry.flight import beams
@@ -33,6 +35,7 @@ SHOTS = 300
 @pytest.fixture(autouse=True)
 def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(simulate, "BLOCK", 128)
+    monkeypatch.setattr(writers, "AT_ONCE", 128)
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +77,46 @@ def test_neither_interrupts_nor_workers_change_a_byte(suffix: str, tmp_path: Pat
     simulate_file(Simulation(woodland(), shared, scheduler=cluster.scheduler_address))
     assert whole.read_bytes() == broken.read_bytes() == shared.read_bytes()
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(path.name for path in (whole, broken, shared))
+
+
+def interrupted(job: Simulation) -> None:
+    """Break a job off when its first block is made."""
+
+    def interrupt(doing: str, done: int, _: int | None) -> None:
+        if done:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        simulate_file(job, interrupt)
+
+
+def test_blocks_of_another_scene_are_refused_with_the_key_that_differs(tmp_path: Path) -> None:
+    interrupted(Simulation(woodland(seed=1), tmp_path / "waves.npz"))
+    with pytest.raises(StoreError, match="found blocks of a job with seed 1, expected 2: ") as caught:
+        simulate_file(Simulation(woodland(seed=2), tmp_path / "waves.npz"))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_scene_with_a_file_that_has_changed_is_not_resumed_and_its_targets_are_made_anew(tmp_path: Path) -> None:
+    def sheet(height: float) -> None:
+        corners = [(x, y, height) for x, y in ((-100, -100), (100, -100), (100, 100), (-100, 100))]
+        vertices = "".join(f"v {x} {y} {z}\n" for x, y, z in corners)
+        (tmp_path / "sheet.obj").write_text(f"{vertices}f 1 2 3\nf 1 3 4\n")
+
+    sheet(10)
+    file = {"kind": "mesh", "file": str(tmp_path / "sheet.obj"), "sheet": True, "reflectance": {"albedo": 0.3}}
+    scene = changed_scene(targets=[file], shots=SHOTS, platform={"speed": "0 m/s", "scan": None})
+    job = Simulation(scene, tmp_path / "waves.npz")
+    simulate_file(job)
+    interrupted(job)
+    sheet(20)
+    with pytest.raises(StoreError, match=r"found blocks of a job with files \[\['.*sheet\.obj', ") as caught:
+        simulate_file(job)
+    assert "\n" not in str(caught.value)
+    higher = Simulation(scene, tmp_path / "higher.npz")
+    assert simulate_file(higher).resumed == 0
+    with np.load(job.output) as before, np.load(higher.output) as after:
+        np.testing.assert_allclose(before["truth"]["range"] - after["truth"]["range"], 10, atol=1e-3)
 
 
 def test_another_seed_gives_other_waveforms(tmp_path: Path) -> None:
@@ -127,7 +170,9 @@ def test_hdf5_is_an_lvis_granule(tmp_path: Path) -> None:
     with h5py.File(granule) as file, np.load(flat) as archive:
         assert file["TRUTH"][:].tobytes() == archive["truth"].tobytes()  # nan is the incidence of leaves
         assert np.array_equal(file["NOISELESS"][:], archive["noiseless"])
+        assert file["SHOTNUMBER"][:].tolist() == list(range(SHOTS))
         assert file["TXWAVE"][0].max() == 512
+        assert (file["TXWAVE"][:] == file["TXWAVE"][0]).all()
 
 
 @pytest.mark.parametrize("name", list(bundled()))
@@ -171,6 +216,7 @@ def test_what_cannot_be_simulated_is_one_line(run: Run, tmp_path: Path) -> None:
     refused(run("simulate", "ice", "-o", tmp_path / "no" / "waves.npz"), "no folder", "expected one")
     refused(run("simulate", "nowhere", "-o", tmp_path / "waves.npz"), "nowhere: no such scene, expected a YAML file")
     refused(run("simulate", "ice", "-o", tmp_path / "waves.npz", "--rays", 100), "found 100, expected a power of two")
+    refused(run("simulate", "ice", "-o", tmp_path / "waves.npz", "--shots", 4 * 10**9), "ice: shots: found 4000000000")
     both = ("--jobs", 2, "--scheduler", "tcp://127.0.0.1:1")
     refused(run("simulate", "ice", "-o", tmp_path / "waves.npz", *both), "expected one of them")
     assert not list(tmp_path.iterdir())

@@ -361,6 +361,24 @@ def test_an_array_needs_as_many_channels_as_beams() -> None:
     )
 
 
+def test_waveforms_can_be_numbered_in_32_bits() -> None:
+    data = plain()
+    data["platform"]["scan"] = {"kind": "raster", "rows": 64, "columns": 64, "spacing": "0.1 deg"}
+    data["digitiser"]["channels"] = 2**12
+    assert loads(yaml.safe_dump(data | {"shots": 2**20}), HERE).shots == 2**20
+    line = "shots: found 1048577 of 4096 beams each, expected at most 1048576"
+    assert refusal(yaml.safe_dump(data | {"shots": 2**20 + 1})) == line
+
+
+def test_keys_that_are_changed_are_checked_as_those_of_a_file() -> None:
+    for name in SCENES:
+        scene = load(name)
+        assert schema.changed(scene) == scene
+        assert schema.changed(scene, shots=7, seed=9) == scene.model_copy(update={"shots": 7, "seed": 9})
+    with pytest.raises(SceneError, match=r"^shots: found 0, expected a whole number from 1 to 1000000000$"):
+        schema.changed(load("ice"), shots=0)
+
+
 def test_sections_that_are_left_out_stay_out() -> None:
     data = plain()
     for key in ("atmosphere", "seed", "description"):

@@ -16,7 +16,7 @@ from openecho.batch.decompose import Advance
 from openecho.batch.distribute import run
 from openecho.batch.store import Store, open_store, written
 from openecho.formats.writers import Content, writer
-from openecho.scene.schema import Scene, dumped, loads
+from openecho.scene.schema import Scene, Section, dumped, loads
 from openecho.scene.simulate import TRUTH, Simulated, Simulator, blocks, simulate, simulator
 
 
@@ -87,27 +87,24 @@ def simulate_file(job: Simulation, advance: Advance = lambda doing, done, total:
         One line with what was found and what was expected: of the output, in the scene's files, of the blocks of an
         earlier run, of the cluster.
     OSError
-        If something can't be written: disk full, no permission.
+        If something can't be read or written: a file that is gone, disk full, no permission.
     """
     write = writer(job.output)
-    text, plan, each = dumped(job.scene), blocks(job.scene), job.scene.beams
-    ready = _ready(text, job.fidelity, job.rays)  # before anything is kept: its files may be of no use
+    plan, each = blocks(job.scene), job.scene.beams
+    shared = _Shared(dumped(job.scene), _files(job.scene), job.fidelity, job.rays)
+    ready = _ready(shared)  # before anything is kept: its files may be of no use
     total = job.scene.shots * each
-    with open_store(job.output, _description(job, text)) as store:
+    with open_store(job.output, _description(job, shared)) as store:
         finished = store.finished()
         resumed = done = each * sum(plan[number][1] for number in finished)
         advance("simulating", done, total)
-        left = (
-            (number, (text, job.fidelity, job.rays, *shots))
-            for number, shots in enumerate(plan)
-            if number not in finished
-        )
+        left = ((number, (shared, *shots)) for number, shots in enumerate(plan) if number not in finished)
         for number, made in run(_simulate_block, left, job.jobs, job.scheduler):
             store.put(number, **_columns(made, noiseless=job.noiseless))
             done += each * plan[number][1]
             advance("simulating", done, total)
         advance("writing", 0, None)
-        content = _content(job, ready, store, len(plan), text)
+        content = _content(job, ready, store, len(plan), shared.text)
         partial = store.folder / f"waveforms{job.output.suffix}"
         with written(partial):
             write(partial, content)
@@ -115,14 +112,49 @@ def simulate_file(job: Simulation, advance: Advance = lambda doing, done, total:
     return SimulationResult(total, content.columns["truth"][1][0], resumed)
 
 
+@dataclass(frozen=True)
+class _Shared:
+    """What every worker makes its targets of.
+
+    Attributes
+    ----------
+    text : str
+        The scene as YAML.
+    files : tuple of (str, int, int)
+        Files that it names, with bytes and time of the last change, ns: of others, the targets are made anew.
+    fidelity, rays
+        As of `Simulation`.
+    """
+
+    text: str
+    files: tuple[tuple[str, int, int], ...]
+    fidelity: str
+    rays: int | None
+
+
 @lru_cache(maxsize=1)
-def _ready(text: str, fidelity: str, rays: int | None) -> Simulator:
+def _ready(shared: _Shared) -> Simulator:
     """A scene's targets, made once for all blocks of a worker."""
-    return simulator(loads(text, Path("scene.yaml")), fidelity, rays)
+    return simulator(loads(shared.text, Path("scene.yaml")), shared.fidelity, shared.rays)
 
 
-def _simulate_block(text: str, fidelity: str, rays: int | None, first: int, shots: int) -> Simulated:
-    return simulate(_ready(text, fidelity, rays), first, shots)
+def _simulate_block(shared: _Shared, first: int, shots: int) -> Simulated:
+    return simulate(_ready(shared), first, shots)
+
+
+def _files(scene: Scene) -> tuple[tuple[str, int, int], ...]:
+    """Files that a scene names, as `_Shared` has them; the buffers that a glTF names are not among them."""
+    known = ((path, path.stat()) for path in _paths(scene))
+    return tuple((str(path), status.st_size, status.st_mtime_ns) for path, status in known)
+
+
+def _paths(part: Any) -> Iterator[Path]:
+    """Paths in a part of a scene: of a section, which hands out its keys with their values, or of a tuple."""
+    if isinstance(part, Path):
+        yield part
+    elif isinstance(part, Section | tuple):
+        for inner in part:
+            yield from _paths(inner)
 
 
 def _columns(made: Simulated, *, noiseless: bool) -> dict[str, NDArray[Any]]:
@@ -136,10 +168,10 @@ def _columns(made: Simulated, *, noiseless: bool) -> dict[str, NDArray[Any]]:
     return columns | ({"noiseless": made.noiseless} if noiseless else {})
 
 
-def _description(job: Simulation, text: str) -> dict[str, Any]:
-    """Everything that the blocks depend on."""
+def _description(job: Simulation, shared: _Shared) -> dict[str, Any]:
+    """Everything that the blocks depend on; key by key, so that one line says what differs."""
     settings = {"fidelity": job.fidelity, "rays": job.rays, "noiseless": job.noiseless}
-    return {"version": __version__, **settings, "scene": text}
+    return {"version": __version__, **settings, **job.scene.model_dump(mode="json"), "files": shared.files}
 
 
 def _content(job: Simulation, ready: Simulator, store: Store, count: int, text: str) -> Content:

@@ -16,12 +16,13 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from openecho.formats.recording import DataError
-
-EPOCH = (1980, 1, 1, 0, 0, 0)
-"""Date of every member: a zip file begins there, and the same waveforms give the same bytes on any day."""
+from openecho.tables.npz import EPOCH
 
 EAST, NORTH = 6378137.0, 6335439.327
 """m, radii of the WGS 84 ellipsoid's equator and of its meridians there: where a scene without a place is put."""
+
+AT_ONCE = 2**12
+"""Shots whose number and pulse, which are in no block, are written at a time."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ def write_npz(path: Path, content: Content) -> None:
     """Write a ``.npz``: a member for each column, `length`, `bin_ns`, `pulse` and `scene`; stored, so quick to read."""
     waveforms, samples = content.columns["samples"][1]
     whole = {
-        "length": np.full(waveforms, samples, np.int32),
+        "length": np.broadcast_to(np.int32(samples), waveforms),
         "bin_ns": np.array(content.bin_ns),
         "pulse": content.pulse,
         "scene": np.array(content.scene),
@@ -82,11 +83,13 @@ def write_lvis(path: Path, content: Content) -> None:
     waveforms, samples = content.columns["samples"][1]
     with h5py.File(path, "w", libver="latest") as file:
         file.attrs["bin_ns"], file.attrs["scene"] = content.bin_ns, content.scene
-        file["SHOTNUMBER"] = np.arange(waveforms, dtype=np.uint32)
         # The transmitted pulse fills half of the 10 bits of LVIS.
-        file["TXWAVE"] = np.broadcast_to(
-            np.rint(512 * content.pulse).astype(np.uint16), (waveforms, len(content.pulse))
-        )
+        pulses = np.tile(np.rint(512 * content.pulse).astype(np.uint16), (min(AT_ONCE, waveforms), 1))
+        shots = file.create_dataset("SHOTNUMBER", (waveforms,), np.uint32)
+        sent = file.create_dataset("TXWAVE", (waveforms, len(content.pulse)), np.uint16)
+        for first in range(0, waveforms, AT_ONCE):
+            last = min(first + AT_ONCE, waveforms)
+            shots[first:last], sent[first:last] = np.arange(first, last), pulses[: last - first]
         _fill(file, "TIME", content, "time")
         _fill(file, "RXWAVE", content, "samples")
         for column, number in (("first", 0), ("last", samples - 1)):

@@ -24,6 +24,9 @@ EFFECTS = (
 )
 """What may be left out where it can't be seen."""
 
+WIDEST = 4.0
+"""Radii of a footprint, e^-32 of whose energy is further out."""
+
 
 @dataclass(frozen=True)
 class Instrument:
@@ -172,10 +175,6 @@ def instrument(scene: Scene, kept: Collection[str] = EFFECTS) -> Instrument:
         shot=counts * shot,
         kept=frozenset(kept),
     )
-
-
-WIDEST = 4.0
-"""Radii of a footprint, e^-32 of whose energy is further out."""
 
 
 def _parts(power: Floats, peak: int) -> Floats:

@@ -87,8 +87,8 @@ class Returned:
     owners : int64 (n, most, 3)
         Target, object, and 1 for leaves, of what each beam met; target `NOWHERE`: no more.
     sums : float64 (n, most, 4)
-        What it sends back, 1/sr; and that times the range from `origin`, that range squared, and the angle with the
-        normal.
+        What it sends back, 1/sr; and that times the range from the first step of the beam's profile, that range
+        squared, and the angle with the normal.
     """
 
     start: Floats

@@ -28,7 +28,7 @@ from openecho.scene.document import SceneError, dumps, explained, parse, read
 from openecho.scene.fields import File, Flag, OnOff, Quantity, Whole, wrong
 from openecho.scene.units import quoted
 
-__all__ = ["Scene", "SceneError", "bundled", "described", "dumped", "json_schema", "load"]
+__all__ = ["Scene", "SceneError", "bundled", "changed", "described", "dumped", "json_schema", "load"]
 
 CONVENTIONS = """
 Every quantity is written with its unit, as 300 m. x points east, y north, z up; an azimuth is taken from north
@@ -41,6 +41,8 @@ LEAD = 64
 
 MOST_SHOTS = 10**9
 MOST_BEAMS = 2**16
+MOST_WAVEFORMS = 2**32
+"""Shots times beams: an LVIS granule numbers its waveforms in 32 bits."""
 
 
 Length = Annotated[float, Quantity(units.LENGTH)]
@@ -518,6 +520,9 @@ class Scene(Section):
         channels = self.digitiser.channels
         if channels < self.beams:
             raise wrong(f"found {channels}, expected at least {self.beams}, the beams of a shot", "digitiser.channels")
+        if self.shots * self.beams > MOST_WAVEFORMS:
+            most = MOST_WAVEFORMS // self.beams
+            raise wrong(f"found {self.shots} of {self.beams} beams each, expected at most {most}", "shots")
         lit = self.atmosphere is not None and bool(self.atmosphere.background)
         if lit and self.receiver.filter_width is None:
             raise wrong("found nothing, expected it for the background light", "receiver.filter_width")
@@ -556,11 +561,39 @@ def loads(text: str, path: Path) -> Scene:
     return _checked(path, parse(text, path))
 
 
+def changed(scene: Scene, **chosen: Any) -> Scene:
+    """A scene with other values of some keys, which are checked as those of a file are.
+
+    Parameters
+    ----------
+    scene : Scene
+    **chosen
+        Values by key, as YAML has them.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    SceneError
+        If it can't be used: one line with the key, what was found and what was expected.
+    """
+    return _validated(_plain(scene) | chosen, Path())  # its files have absolute paths
+
+
 def _checked(path: Path, data: dict[Any, Any]) -> Scene:
     try:
-        return Scene.model_validate(data, context={"folder": path.parent})
+        return _validated(data, path.parent)
+    except SceneError as error:
+        raise SceneError(f"{path}: {error}") from error
+
+
+def _validated(data: dict[Any, Any], folder: Path) -> Scene:
+    try:
+        return Scene.model_validate(data, context={"folder": folder})
     except ValidationError as error:
-        raise SceneError(f"{path}: {explained(data, dict(error.errors(include_url=False)[0]))}") from error
+        raise SceneError(explained(data, dict(error.errors(include_url=False)[0]))) from error
 
 
 def bundled_files() -> dict[str, Path]:
@@ -575,7 +608,12 @@ def bundled() -> dict[str, str]:
 
 def dumped(scene: Scene) -> str:
     """A scene as YAML, in SI with units; `load` gives an equal one back, wherever the file is put."""
-    return dumps(scene.model_dump(mode="json", exclude_defaults=True))
+    return dumps(_plain(scene))
+
+
+def _plain(scene: Scene) -> dict[str, Any]:
+    """A scene as YAML holds it."""
+    return scene.model_dump(mode="json", exclude_defaults=True)
 
 
 def json_schema() -> dict[str, Any]:

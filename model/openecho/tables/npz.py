@@ -11,7 +11,7 @@ from numpy.lib import format as npy
 from openecho.tables.table import Table
 
 EPOCH = (1980, 1, 1, 0, 0, 0)
-"""Date of every member: a zip file begins there, and the same echoes give the same bytes on any day."""
+"""Date of every member: a zip file begins there, and the same content gives the same bytes on any day."""
 
 
 def write(path: Path, table: Table) -> int:
