@@ -22,10 +22,10 @@ TAPS_FLAG  := $(if $(TAPS),--taps='$(TAPS)')
 SIM_FLAGS  := $(if $(MODULE),--module '$(MODULE)') $(ARITH_FLAG) $(TAPS_FLAG) $(if $(SIM),--sim '$(SIM)') \
               $(if $(DATA),--data '$(DATA)') $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(WAVES)),--waves)
 
-.PHONY: help sim replay test vectors lint format mutate formal synth vivado coverage precision score figures bench scenes scale registers readme clean
+.PHONY: help sim replay test vectors lint format mutate formal synth vivado coverage precision score figures bench scenes compression scale registers readme clean
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-11s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 sim: $(READY) ## simulate all against their models [MODULE=] [ARITH=] [TAPS=] [SIM=verilator|icarus] [DATA=file] [SEED=] [WAVES=1]
 	@$(RUN) scripts/sim.py $(SIM_FLAGS)
@@ -75,6 +75,9 @@ bench: $(VENV)/.bench ## speed and precision of the Gaussian fit beside gdecomp 
 
 scenes: $(READY) ## methods against the truth of every bundled scene, its plan against full fidelity, speed, a recorded set [SEED=]
 	@$(RUN) -m openecho.study.scenes $(if $(SEED),--seed '$(SEED)')
+
+compression: $(READY) ## bits a sample and speed of the lossless codec beside zlib, zstd and xz, on recorded files
+	@$(RUN) -m openecho.study.compression
 
 scale: $(READY) ## speed and memory on a large granule, interrupted, resumed and in two processes [SEED=]
 	@$(RUN) -m openecho.study.scale $(if $(SEED),--seed '$(SEED)')

@@ -6,6 +6,7 @@ import importlib
 import json
 import signal
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -63,7 +64,7 @@ PICTURE = click.option(
 def openecho() -> None:
     """Echoes out of full-waveform lidar, bit for bit as the OpenEcho core finds them.
 
-    FILE is an LVIS or GEDI L1B granule (HDF5), LAS 1.3 or 1.4 with waveform packets, PulseWaves, .npz or .npy.
+    FILE is an LVIS or GEDI L1B granule (HDF5), LAS 1.3 or 1.4 with waveform packets, PulseWaves, .oec, .npz or .npy.
     """
 
 
@@ -353,6 +354,74 @@ def score(
         report.save(output, content)
 
 
+@openecho.command()
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    callback=in_folder,
+    help="File to write, or a folder for several.  [default: FILE with .oec]",
+)
+@click.option(
+    "--mode",
+    type=click.Choice(["prediction", "threshold"]),
+    default="prediction",
+    show_default=True,
+    help="Adaptive Golomb-Rice codes of prediction errors, or the published threshold coding at its best threshold.",
+)
+@click.option("--bits", type=click.IntRange(1, 16), help="Of a sample.  [default: those of the greatest count]")
+@click.option("--verify", is_flag=True, help="Decode everything and compare it with FILE before the result is kept.")
+def compress(files: tuple[Path, ...], output: Path | None, mode: str, bits: int | None, verify: bool) -> None:
+    """Compress the waveforms of each FILE without loss; every other command reads the result.
+
+    Waveforms, positions, times and shot numbers are kept; what else a file has, as references or the transmitted pulse,
+    is not. The ratio is to samples of as many bits as they need, end to end.
+    """
+    for file in files:
+        made = _compressed_name(file, output, several=len(files) > 1)
+        job = batch.Compression(file, made, _codec().MODES.index(mode), bits, verify)
+        start = time.perf_counter()
+        try:
+            with progress("waveforms") as advance:
+                result = batch.compress_file(job, advance)
+        except KeyboardInterrupt:
+            click.echo("the same command goes on where this one was", err=True)
+            raise
+        seconds = time.perf_counter() - start
+        if result.resumed:
+            click.echo(f"{result.resumed} waveforms were compressed by an earlier run")
+        raw = result.samples * result.bits / 8
+        click.echo(
+            f"{made}: {result.waveforms} waveforms, {result.samples} samples of {result.bits} bits in "
+            f"{8 * result.size / result.samples:.3f} each, ratio {raw / result.size:.3f}, {result.size} bytes, "
+            f"{result.samples / seconds / 1e6:.1f} million samples/s" + (", verified" if verify else "")
+        )
+
+
+@openecho.command()
+@RECORDING
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    callback=in_folder,
+    help="Waveforms to write, .npz.  [default: FILE with .npz]",
+)
+def decompress(file: Path, output: Path | None) -> None:
+    """Write the waveforms of FILE, compressed or not, as .npz."""
+    made = file.with_suffix(".npz") if output is None else output
+    if made.suffix.lower() != ".npz":
+        raise click.UsageError(f"{made}: found the suffix {made.suffix or 'none'}, expected .npz")
+    _not_itself(file, made)
+    _codec()
+    with progress("waveforms") as advance:
+        waveforms, left_out = batch.decompress_file(file, made, advance)
+    for name in left_out:
+        click.echo(f"{name} left out: there is no place for them in an .npz")
+    click.echo(f"{made}: {waveforms} waveforms")
+
+
 @openecho.group()
 def scene() -> None:
     """Scenes that a lidar flies over, each a YAML file, and those that are bundled."""
@@ -463,6 +532,33 @@ def scene_schema(as_json: bool) -> None:
     """Say what a scene is made of: every key, its unit, what is assumed where it is left out, and what it means."""
     scenes = _scenes()
     click.echo(json.dumps(scenes.json_schema(), indent=2) if as_json else scenes.described())
+
+
+def _compressed_name(file: Path, output: Path | None, *, several: bool) -> Path:
+    """What a compressed file is called."""
+    if output is None:
+        made = file.with_suffix(".oec")
+    elif output.is_dir():
+        made = output / file.with_suffix(".oec").name
+    elif several:
+        raise click.UsageError(f"{output}: found no folder, expected one for several files")
+    else:
+        made = output
+    _not_itself(file, made)
+    return made
+
+
+def _not_itself(file: Path, made: Path) -> None:
+    if made.resolve() == file.resolve():
+        raise click.UsageError(f"{made}: found the same file for input and output, expected another")
+
+
+def _codec() -> Any:
+    """The codec, which needs a compiler."""
+    try:
+        return importlib.import_module("openecho.codec")
+    except ModuleNotFoundError as error:
+        raise click.UsageError(str(error)) from error
 
 
 def _scenes(module: str = "openecho.scene.schema") -> Any:

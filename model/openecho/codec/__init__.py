@@ -24,8 +24,8 @@ last      31..0   checksum of the samples
 The published header has N, M and T in front. Whoever compresses a stream learns M with the last sample, so M stands
 behind the payload here, with the checksum; and the baselines are new, for digitisers put their zero well above 0, and
 those with two interleaved converters put it at two heights. M is at most the number of bits of the payload, so a reader
-never makes room for more than a record can hold. A change of T that leaves its bit length alone changes no sample;
-every other change of a bit is an error.
+never makes room for more than a record can hold. What changes no sample goes unnoticed: another T of the same bit
+length, a baseline that no sample has. A change of one bit that changes samples is an error, but for one in 2^32.
 
 **Checksum.** A CRC of 32 bits: the remainder of the samples, N bits each, highest first, times 2^32, divided by z^32 +
 z^22 + z^2 + z + 1 over the field of two elements; it starts from all ones, and is not inverted. The polynomial is

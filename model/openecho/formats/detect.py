@@ -7,6 +7,8 @@ from pathlib import Path
 
 from numpy.lib import format as npy
 
+from openecho.formats.compressed import MAGIC as COMPRESSED_MAGIC
+from openecho.formats.compressed import open_compressed
 from openecho.formats.hdf5 import open_hdf5
 from openecho.formats.las import open_las
 from openecho.formats.numpy_files import open_npy, open_npz
@@ -17,13 +19,14 @@ OPENERS: tuple[tuple[bytes, str, Callable[[Path], Recording]], ...] = (
     (b"\x89HDF\r\n\x1a\n", "HDF5 of LVIS or GEDI", open_hdf5),
     (b"LASF", "LAS with waveform packets", open_las),
     (PULSES_MAGIC, "PulseWaves", open_pulsewaves),
+    (COMPRESSED_MAGIC, "readable .oec", open_compressed),
     (b"PK\x03\x04", "readable .npz of integers", open_npz),
     (b"PK\x05\x06", "readable .npz of integers", open_npz),
     (npy.MAGIC_PREFIX, "readable .npy of integers", open_npy),
 )
 """First bytes of a file, what an error says was expected of it, and what opens it."""
 
-READABLE = "LVIS or GEDI L1B (HDF5), LAS with waveform packets, PulseWaves (.pls), .npz or .npy"
+READABLE = "LVIS or GEDI L1B (HDF5), LAS with waveform packets, PulseWaves (.pls), .oec, .npz or .npy"
 
 
 def open(path: str | Path) -> Recording:
@@ -33,7 +36,8 @@ def open(path: str | Path) -> Recording:
     ----------
     path : str or Path
         LVIS or GEDI L1B in HDF5, LAS with waveform packets (a ``.wdp`` is found beside it), PulseWaves
-        (the ``.pls``; its ``.wvs`` is found beside it), ``.npz`` or ``.npy``. The content decides, not the name.
+        (the ``.pls``; its ``.wvs`` is found beside it), ``.oec``, ``.npz`` or ``.npy``. The content decides, not the
+        name.
 
     Returns
     -------

@@ -33,34 +33,31 @@ class Content:
     ----------
     columns : dict
         Type and shape of each column. ``samples`` uint16 (n, m), ``time`` float64 (n,) in seconds, ``first`` and
-        ``last`` float64 (n, 3), where the first and the last sample are, m; maybe ``noiseless`` float32 (n, m), counts;
-        and ``truth``, a structured array.
+        ``last`` float64 (n, 3), where the first and the last sample are, m; maybe ``length`` int32 (n,), if not all are
+        m; ``noiseless`` float32 (n, m), counts; and ``truth``, a structured array.
     blocks : callable
         Pieces of a column in order, by its name; called once for each.
-    bin_ns : float
+    bin_ns : float or None
         Sample interval.
     pulse : float64 (k,)
         As it is recorded, counts of a height of 1, one a sample.
     scene : str
-        What was simulated, as YAML.
+        What was simulated, as YAML. Both alone of what was simulated.
     """
 
     columns: dict[str, tuple[np.dtype[Any], tuple[int, ...]]]
     blocks: Callable[[str], Iterator[NDArray[Any]]]
-    bin_ns: float
-    pulse: NDArray[np.float64]
-    scene: str
+    bin_ns: float | None
+    pulse: NDArray[np.float64] | None = None
+    scene: str | None = None
 
 
 def write_npz(path: Path, content: Content) -> None:
     """Write a ``.npz``: a member for each column, `length`, `bin_ns`, `pulse` and `scene`; stored, so quick to read."""
     waveforms, samples = content.columns["samples"][1]
-    whole = {
-        "length": np.broadcast_to(np.int32(samples), waveforms),
-        "bin_ns": np.array(content.bin_ns),
-        "pulse": content.pulse,
-        "scene": np.array(content.scene),
-    }
+    whole: dict[str, Any] = {"bin_ns": content.bin_ns, "pulse": content.pulse, "scene": content.scene}
+    if "length" not in content.columns:
+        whole = {"length": np.broadcast_to(np.int32(samples), waveforms)} | whole
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
         for name, (dtype, shape) in content.columns.items():
             header = {"descr": npy.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
@@ -68,9 +65,11 @@ def write_npz(path: Path, content: Content) -> None:
                 npy.write_array_header_1_0(member, header)  # type: ignore[no-untyped-call, unused-ignore]
                 for block in content.blocks(name):
                     member.write(np.ascontiguousarray(block).tobytes())
-        for name, array in whole.items():
+        for name, value in whole.items():
+            if value is None:
+                continue
             with archive.open(zipfile.ZipInfo(f"{name}.npy", EPOCH), "w") as member:
-                npy.write_array(member, array)
+                npy.write_array(member, np.asarray(value))
 
 
 def write_lvis(path: Path, content: Content) -> None:
@@ -80,6 +79,7 @@ def write_lvis(path: Path, content: Content) -> None:
     meridian as WGS 84 has it. Beside those names, ``NOISELESS`` and ``TRUTH`` where they are there, and the attributes
     ``bin_ns`` and ``scene``, for no LVIS granule tells its sample interval.
     """
+    assert content.pulse is not None  # an LVIS granule is only made of what was simulated
     waveforms, samples = content.columns["samples"][1]
     with h5py.File(path, "w", libver="latest") as file:
         file.attrs["bin_ns"], file.attrs["scene"] = content.bin_ns, content.scene
