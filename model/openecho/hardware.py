@@ -86,6 +86,8 @@ class Module:
         For an output's prefix, the cycles from the transfer of the beat that determines an output beat to the transfer
         of that beat, in an idle module whose sink is ready: a function of the `Config`, or of the `FloatUnit`. Where an
         echo takes longer than a trailer, by what its interpolations and divisions take, that of a trailer.
+    waits : int
+        Clocks for which the first input may wait in each waveform, with a ready sink, while its first samples pass.
     budget : Budget or None
         What it may take: what it took when this was last looked at, so that a change that makes it grow is noticed.
     """
@@ -97,6 +99,7 @@ class Module:
     settings: tuple[str, ...] = ()
     golden: Callable[..., Beats | tuple[Beats, ...]] | None = None
     latency: dict[str, Callable[[Any], int]] | None = None
+    waits: int = 0
     budget: Budget | None = None
 
     @property
@@ -277,6 +280,28 @@ MODULES: dict[str, Module] = {
             latency={"m": _core_latency},
             budget=Budget(lut=999, ff=1486, dsp=2),
         ),
+        # The lossless codec
+        Module(
+            name="encoder",
+            parameters=("SAMPLE_W",),
+            inputs=(Stream("s", ("sample",)),),
+            outputs=(Stream("m", ("word",)),),
+            settings=("mode", "threshold", "baseline_even", "baseline_odd"),
+            golden=golden.encoder,
+            latency={"m": lambda _: 9},
+            waits=5,
+            budget=Budget(lut=467, ff=570),
+        ),
+        Module(
+            name="decoder",
+            parameters=("SAMPLE_W",),
+            inputs=(Stream("s", ("word",)),),
+            outputs=(Stream("m", ("sample", "flags")),),
+            golden=golden.decoder,
+            latency={"m": lambda _: 2},
+            # One loop by nature: where a code begins, and what it means, hangs on the sample before.
+            budget=Budget(lut=880, ff=309, path_ns=9.0),
+        ),
         # The core on AXI buses, verified by tb/axi
         Module(name="axi", parameters=_ALL),
         Module(name="axi_top", parameters=_ALL),
@@ -286,6 +311,11 @@ MODULES: dict[str, Module] = {
         Module(name="detect", parameters=_ALL),
         Module(name="threshold", parameters=("SAMPLE_W",)),
         Module(name="noise", parameters=("SAMPLE_W", "MAX_SAMPLES")),
+        Module(name="predictor", parameters=("SAMPLE_W",)),
+        Module(name="coder", parameters=("SAMPLE_W",)),
+        Module(name="packer", parameters=("SAMPLE_W",)),
+        Module(name="restorer", parameters=("SAMPLE_W",)),
+        Module(name="crc", parameters=("SAMPLE_W",)),
         Module(name="fifo"),
         Module(name="multiply"),
         Module(name="scale"),
@@ -339,6 +369,10 @@ def settings(config: Config) -> dict[str, int]:
         "min_interval": config.min_interval,
         "min_amplitude": config.min_amplitude,
         "k": config.k_raw,
+        "mode": config.codec_mode,
+        "threshold": config.codec_threshold,
+        "baseline_even": config.codec_baseline_even,
+        "baseline_odd": config.codec_baseline_odd,
     }
 
 

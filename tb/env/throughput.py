@@ -10,7 +10,10 @@ from tb.env.waveforms import dense
 
 @pyuvm.test()
 class OneSampleAClockWhateverTheEchoes(ModuleTest):
-    """No stall of the input while the sink is ready, with as many components as fit, in long and short waveforms."""
+    """No stall of the input while the sink is ready, with as many components as fit, in long and short waveforms.
+
+    But for what the module table allows each waveform at its start.
+    """
 
     async def scenario(self) -> None:
         """Play waveforms that cross zero as often as they can."""

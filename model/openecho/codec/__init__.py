@@ -32,11 +32,11 @@ z^22 + z^2 + z + 1 over the field of two elements; it starts from all ones, and 
 primitive (P. Alfke, Xilinx XAPP052, 1996) and has few terms, so that a sample a clock takes few gates.
 
 **Code.** Of a value v >= 0 with a parameter k and a limit E, q = floor(v / 2^k): if q < E, q zeros, a one and the low k
-bits of v; otherwise E zeros and the N bits of the sample itself, as it was digitised (an escape). Codes of at most k +
-E + 1 or N + E bits cannot grow without bound, and a credit keeps the whole from it: it starts at 32; a sample that
-finds less than 16 is written as its N bits alone, without a code, and leaves it as it is; every other takes the length
-of its code from it and adds N, except that a credit of 128 or more grows no further (a code shorter than N leaves it as
-it is). So a payload has at most 32 bits more than its samples.
+bits of v; otherwise E zeros and the N bits of the sample itself, as it was digitised (an escape). Codes have at most
+k + E or N + E bits, and a credit keeps the whole from growing: it starts at 32; a sample that finds less than 16 is
+written as its N bits alone, without a code, and so are all behind it; every other takes the length of its code from the
+credit and adds N, except that a credit of 128 or more grows no further (a code shorter than N leaves it as it is). So a
+payload has at most 32 bits more than its samples.
 
 **Mode 0, threshold.** v = (sample - baseline) mod 2^N with the baseline of its index, k = l, the bit length of T, and E
 = 1: a flag bit and l or N bits. The published flag is the other way round: 0 before the l bits of a small value, 1

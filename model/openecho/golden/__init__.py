@@ -17,6 +17,9 @@ from .beats import Beats, stream
 from .config import (
     AMP_FRAC,
     ARITHMETICS,
+    BAD_CHECK,
+    BAD_FORM,
+    BAD_LENGTH,
     NO_NOISE,
     NO_PEAK,
     NOISE_SAMPLES,
@@ -30,6 +33,8 @@ from .config import (
     Config,
 )
 from .core import core
+from .decoder import decoder
+from .encoder import encoder
 from .filter import filter
 from .inflection import inflection
 from .output import output
@@ -42,6 +47,9 @@ from .taps import MAX_TAPS, PAPER_TAPS, TAP_SETS, gaussian_taps
 __all__ = [
     "AMP_FRAC",
     "ARITHMETICS",
+    "BAD_CHECK",
+    "BAD_FORM",
+    "BAD_LENGTH",
     "MAX_TAPS",
     "NOISE_SAMPLES",
     "NO_NOISE",
@@ -59,6 +67,8 @@ __all__ = [
     "Config",
     "core",
     "decode_records",
+    "decoder",
+    "encoder",
     "filter",
     "float64",
     "gaussian_taps",

@@ -22,6 +22,8 @@ SATURATED, TRUNCATED, NO_PEAK = 1, 2, 4
 """Flags of an echo."""
 TOO_SHORT, TOO_LONG, NO_NOISE = 1, 2, 4
 """Flags of a trailer."""
+BAD_FORM, BAD_LENGTH, BAD_CHECK = 1, 2, 4
+"""Flags of a record that the decoder found out of order: its head, its payload and their lengths, its checksum."""
 
 ARITHMETICS = {
     "fixed": (0, 16),
@@ -34,7 +36,7 @@ ARITHMETICS = {
 
 @dataclass(frozen=True)
 class Config:
-    """Parameters and settings of the core.
+    """Parameters and settings of the core and of the codec.
 
     Parameters
     ----------
@@ -58,6 +60,12 @@ class Config:
         Least amplitude of an echo, in counts.
     k : float
         Least amplitude of an echo in noise deviations, a multiple of 1/16 below 16.
+    codec_mode : int
+        How the encoder compresses: 0 threshold, 1 prediction.
+    codec_threshold : int
+        The encoder's threshold, in counts; 0 if it predicts.
+    codec_baseline_even, codec_baseline_odd : int
+        What the encoder takes the samples with even and with odd indices to lie on, in counts.
 
     Raises
     ------
@@ -74,6 +82,10 @@ class Config:
     min_interval: int = 5
     min_amplitude: int = 5
     k: float = 3.0
+    codec_mode: int = 1
+    codec_threshold: int = 0
+    codec_baseline_even: int = 0
+    codec_baseline_odd: int = 0
 
     def __post_init__(self) -> None:
         _check_integer("sample_w", self.sample_w, 8, 16)
@@ -92,6 +104,11 @@ class Config:
         _check_integer("min_amplitude", self.min_amplitude, 0, (1 << self.sample_w) - 1)
         _check_ratio("n", self.n)
         _check_ratio("k", self.k)
+        _check_integer("codec_mode", self.codec_mode, 0, 1)
+        full_scale = (1 << self.sample_w) - 1
+        _check_integer("codec_threshold", self.codec_threshold, 0, 0 if self.codec_mode else full_scale)
+        _check_integer("codec_baseline_even", self.codec_baseline_even, 0, full_scale)
+        _check_integer("codec_baseline_odd", self.codec_baseline_odd, 0, full_scale)
         if self.form is not None:
             self._check_range(self.form)
 
