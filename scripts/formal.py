@@ -254,6 +254,126 @@ INTERPOLATE_FAULTS = (
         "!sum[ADDER_W-1]};",
     ),
 )
+ENCODER_FAULTS = (
+    Change(
+        "a stall is ignored between prediction and code",
+        "codec/openecho_predictor.sv",
+        "else if (advance) m_valid <= valid_q;",
+        "else m_valid <= valid_q;",
+    ),
+    Change(
+        "a gap ends the waveform",
+        "codec/openecho_predictor.sv",
+        "if (s_valid) first_q <= s_last;",
+        "first_q <= s_last;",
+    ),
+    Change(
+        "a sample without a code has the flag of a large one",
+        "codec/openecho_coder.sv",
+        "m_code[SAMPLE_W] <= !mode && escape_q2 && !plain;",
+        "m_code[SAMPLE_W] <= !mode && escape_q2;",
+    ),
+    Change(
+        "codes go on until the credit is 0",
+        "codec/openecho_coder.sv",
+        "assign plain = credit_q[CREDIT_W-1:ESCAPE_W] == 0;",
+        "assign plain = credit_q == 0;",
+    ),
+    Change(
+        "the credit goes on from one waveform to the next",
+        "codec/openecho_coder.sv",
+        "if (rst || (advance && valid_q2 && last_q2)) credit_q",
+        "if (rst) credit_q",
+    ),
+)
+PACKER_FAULTS = (
+    Change(
+        "a full word does not wait for the head",
+        "codec/openecho_packer.sv",
+        "(flush_q || due || begun_q));",
+        "(flush_q || due));",
+    ),
+    Change(
+        "what is left behind the last code is dropped",
+        "codec/openecho_packer.sv",
+        "word_q <= flush_q ? rest_q : put && full_q3;",
+        "word_q <= !flush_q && put && full_q3;",
+    ),
+    Change(
+        "codes that end with a word have a word of zeros behind them",
+        "codec/openecho_packer.sv",
+        "rest_q <= !whole_q3;",
+        "rest_q <= 1'b1;",
+    ),
+    Change(
+        "a half word is lost where a code ends with its word",
+        "codec/openecho_packer.sv",
+        "assign old_low = full_q3 && (whole_q3 || ends_high_q3);",
+        "assign old_low = full_q3 && ends_high_q3;",
+    ),
+    Change(
+        "the count goes on from one waveform to the next",
+        "codec/openecho_packer.sv",
+        "      count_q <= '0;\n",
+        "      if (rst) count_q <= '0;\n",
+    ),
+    Change(
+        "a stall of the output is ignored",
+        "codec/openecho_packer.sv",
+        "assign free = !m_valid || m_ready;",
+        "assign free = 1'b1;",
+    ),
+)
+DECODER_FAULTS = (
+    Change(
+        "what is left of a record with a bad head is the next one",
+        "codec/openecho_decoder.sv",
+        "if (form_q || bad_1) state_q <= DRAIN;",
+        "if (form_q || bad_1) state_q <= HEAD_0;",
+    ),
+    Change(
+        "a record may end before its tail",
+        "codec/openecho_decoder.sv",
+        "if (s_last && state_q != RUN) begin",
+        "if (s_last && state_q != RUN && state_q != FILL_0) begin",
+    ),
+    Change(
+        "a payload that ends too early is decoded for ever",
+        "codec/openecho_decoder.sv",
+        "(over_q || 32'(count_q) >= then_q);",
+        "32'(count_q) >= then_q;",
+    ),
+    Change(
+        "the last word stays that of the record before",
+        "codec/openecho_decoder.sv",
+        "      last_word_q <= 1'b0;\n",
+        "",
+    ),
+    Change(
+        "a sample leaves twice if the next one waits for its word",
+        "codec/openecho_decoder.sv",
+        "m_valid <= (step && count_q != 0) || finish || state_q == REPORT;",
+        "m_valid <= (state_q == RUN && count_q != 0) || finish || state_q == REPORT;",
+    ),
+    Change(
+        "a word of zeros too many is not noticed",
+        "codec/openecho_decoder.sv",
+        "|| at_q == 0",
+        "|| 1'b0",
+    ),
+    Change(
+        "the checksum goes on from the last waveform's",
+        "codec/openecho_decoder.sv",
+        ".s_crc(checksum_q | {32{first_q}}),",
+        ".s_crc(checksum_q),",
+    ),
+    Change(
+        "a stall of the output is ignored",
+        "codec/openecho_decoder.sv",
+        "assign advance = !m_valid || m_ready;",
+        "assign advance = 1'b1;",
+    ),
+)
 ROWS = (
     *(
         Row(
@@ -517,6 +637,40 @@ ROWS = (
             *(f"dut.u_inflection.{name}" for name in ("crossing_taken", "position_valid", "position")),
             *("dut.u_parameters.solved", "dut.u_parameters.width_solved"),
         ),
+    ),
+    *(
+        Row(
+            f"encoder, {sample_w} bits",
+            "encoder",
+            "each sample one code, in order, of at most 32 bits; at most 32 bits more than its waveform's samples",
+            planted,
+            {"SAMPLE_W": sample_w},
+            cover_depth=cover_depth,
+            cut=("dut.s_ready", *(f"dut.m_{name}" for name in ("valid", "last", "word"))),
+        )
+        for sample_w, cover_depth, planted in ((8, 16, ENCODER_FAULTS), (16, 16, ()))
+    ),
+    *(
+        Row(
+            f"packer, {sample_w} bits",
+            "packer",
+            "each waveform one record: head, every bit of its codes, their number, their checksum, in order, in time",
+            planted,
+            {"SAMPLE_W": sample_w},
+            cover_depth=cover_depth,
+        )
+        for sample_w, cover_depth, planted in ((8, 0, ()), (16, 20, PACKER_FAULTS))
+    ),
+    *(
+        Row(
+            f"decoder, {sample_w} bits",
+            "decoder",
+            "one last beat for any record, in time; no flag if and only if it is sound; each begins clean",
+            planted,
+            {"SAMPLE_W": sample_w},
+            cover_depth=14,
+        )
+        for sample_w, planted in ((8, DECODER_FAULTS), (16, ()))
     ),
     Row(
         "axi_lite",

@@ -18,7 +18,7 @@ README = ROOT / "README.md"
 PICTURE = ROOT / "docs" / "core.png"
 MAKERS = (
     *("make sim", "make precision", "make synth CLOCK=1"),
-    *("make score DATA=gedi_cerrado.npz", "make bench", "make scenes"),
+    *("make score DATA=gedi_cerrado.npz", "make bench", "make scenes", "make compression"),
 )
 """What makes the reports."""
 MERGED = "savanna"
@@ -260,6 +260,33 @@ def _judged(found: dict[str, Any]) -> str:
     return f"{found['within_3']:.0%}, {found['peak_rms']:.2f}, {found['ground_within_3']:.0%}"
 
 
+WAYS = {
+    "published": "published coding",
+    "published, best T": "its best T",
+    "threshold": "threshold, with baseline",
+    "prediction": "prediction",
+    "file": "as a file",
+    "zlib 9": "zlib 9",
+    "zstd 19": "zstd 19",
+    "xz 9": "xz 9",
+    "entropy": "entropy",
+    "entropy, fixed order": "of a fixed order",
+}
+"""Ways to compress, and what they are called."""
+
+
+def compression(content: dict[str, Any]) -> list[str]:
+    """Bits a sample of every set, each way."""
+    if len(content["sets"]) < 3:
+        raise ValueError("compression.json lacks the recorded files: run make compression with OPENECHO_DATA set")
+    head = ("waveforms", "N", *WAYS.values())
+    rows = (
+        (name, row["bits"], *(f"{row['bits_a_sample'][way]:.2f}" for way in WAYS))
+        for name, row in content["sets"].items()
+    )
+    return table(head, rows)
+
+
 PARTS: dict[str, tuple[str | None, Callable[[dict[str, Any]], list[str]]]] = {
     "modules": ("sim", modules),
     "units": ("sim", units),
@@ -269,6 +296,7 @@ PARTS: dict[str, tuple[str | None, Callable[[dict[str, Any]], list[str]]]] = {
     "recall": ("score", recall),
     "fits": ("bench", fits),
     "scenes": ("scenes", scenes),
+    "compression": ("compression", compression),
     "differences": ("core_vs_float64", differences),
     "echoes": ("core_vs_float64", echoes),
 }

@@ -100,11 +100,12 @@ FLOAT_UNITS: tuple[tuple[str, str, dict[str, int]], ...] = (
 )
 """Units, variants and the parameters that make them."""
 BUILDS = (
-    *(Build(name, name, Config(), clock=name == "core") for name in bench_names()),
+    *(Build(name, name, Config(), clock=name in ("core", "encoder", "decoder")) for name in bench_names()),
     Build("core with its AXI shell", "axi", Config()),
     Build("core without DSP", "core", Config(), clock=True, dsp=False),
     *(Build(f"core FRAC {frac}", "core", Config(frac=frac)) for frac in (8, 24)),
     *(Build(f"core {name}", "core", Config().in_arithmetic(name), clock=name == "float64") for name in FLOATS),
+    *(Build(f"encoder of {bits} bits", "encoder", Config(sample_w=bits)) for bits in (8, 12, 16)),
     *(
         Build(
             f"float_{unit}{variant} {name}",

@@ -12,7 +12,7 @@ import pytest
 from openecho import hardware, report
 from scripts import formal, synth
 
-QUICK = ("second_difference", "inflection", "parameters", "output")
+QUICK = ("second_difference", "inflection", "parameters", "output", "encoder")
 
 
 def synthesised(name: str) -> tuple[synth.Build, dict[str, Any]]:
@@ -30,6 +30,15 @@ def test_module_stays_within_its_budget(name: str, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(synth, "KEPT", tmp_path)
     build, taken = synthesised(name)
     assert synth.overruns([build], [taken]) == []
+
+
+def test_encoder_of_8_bits_takes_at_most_400_luts_and_neither_dsp_nor_block_ram(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(synth, "KEPT", tmp_path)
+    _, taken = synthesised("encoder of 8 bits")
+    assert taken["lut"] <= 400
+    assert (taken["dsp"], taken["bram36"]) == (0, 0)
 
 
 def test_module_that_grows_fails(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
