@@ -129,6 +129,17 @@ module openecho_filter
     lowest_positive = (factor & ((factor & -factor) << 1)) != 0 ? -factor : factor;
   endfunction
 
+  // value * factor. The digits of 3 * factor that differ from those of the factor are the non-zero ones of twice its
+  // canonical signed form; one is negative where the factor has a 1.
+  function automatic logic signed [SUM_W-1:0] product(input logic signed [SUM_W-1:0] value, input int factor);
+    int digits, d;
+    digits  = (factor + 2 * factor) ^ factor;
+    product = '0;
+    for (d = 0; d < TAP_W + 4; d = d + 1) begin  // a third difference of taps has up to three bits more than they
+      if (digits[d+1]) product = factor[d+1] ? product - (value <<< d) : product + (value <<< d);
+    end
+  endfunction
+
   openecho_check #(
       .SAMPLE_W(SAMPLE_W),
       .MAX_SAMPLES(MAX_SAMPLES),
@@ -192,14 +203,7 @@ module openecho_filter
       logic signed [SAMPLE_W:0] newer, older, difference_q;
       assign newer = {1'b0, history_q[0]};
       assign older = {1'b0, history_q[APART]};
-      openecho_scale #(
-          .VALUE_W(SAMPLE_W + 1),
-          .TOTAL_W(WIDTH),
-          .FACTOR (FACTOR)
-      ) u_scale (
-          .value(difference_q),
-          .total(term)
-      );
+      assign term  = WIDTH'(product(SUM_W'(difference_q), FACTOR));
       always_ff @(posedge clk) begin
         if (clear) difference_q <= '0;
         else if (accept) difference_q <= FACTOR == THIRD ? newer - older : older - newer;
@@ -217,26 +221,7 @@ module openecho_filter
   logic [SAMPLE_W:0] ends_q;
   logic signed [BEND_W-1:0] ends_q2, curvature_q2, bend_q3;
   logic signed [FIRST_W-1:0] step_q4, slope_q4;
-  logic signed [  SUM_W-1:0] sum_before_q;
-  logic signed [ BEND_W-1:0] slope_ends;
-  logic signed [FIRST_W-1:0] scaled_step;
-
-  openecho_scale #(
-      .VALUE_W(SAMPLE_W + 2),
-      .TOTAL_W(BEND_W),
-      .FACTOR (SLOPE_FACTOR)
-  ) u_slope (
-      .value($signed({1'b0, ends_q})),
-      .total(slope_ends)
-  );
-  openecho_scale #(
-      .VALUE_W(SAMPLE_W + 1),
-      .TOTAL_W(FIRST_W),
-      .FACTOR (STEP_FACTOR)
-  ) u_step (
-      .value(step_q3),
-      .total(scaled_step)
-  );
+  logic signed [SUM_W-1:0] sum_before_q;
 
   assign newest = {1'b0, history_q[0]};
   assign oldest = {1'b0, history_q[TAP_COUNT]};
@@ -247,14 +232,14 @@ module openecho_filter
       ends_q <= {1'b0, s_sample} + (fresh_q ? (SAMPLE_W + 1)'(0) : {1'b0, history_q[TAP_COUNT]});
       // stage 2
       if (valid_q[0]) curvature_q2 <= first_q[0] ? '0 : curvature_q2 + BEND_W'(g_chain[2].chain_q);
-      ends_q2 <= slope_ends;
+      ends_q2 <= BEND_W'(product(SUM_W'($signed({1'b0, ends_q})), SLOPE_FACTOR));
       step_q2 <= STEP_FACTOR == STEP ? newest - oldest : oldest - newest;
       // stage 3
       bend_q3 <= SLOPE_FACTOR == SLOPE ? curvature_q2 + ends_q2 : curvature_q2 - ends_q2;
       step_q3 <= step_q2;
       // stage 4
       if (valid_q[2]) slope_q4 <= FIRST_W'(bend_q3) + (first_q[2] ? FIRST_W'(0) : slope_q4);
-      step_q4 <= scaled_step;
+      step_q4 <= FIRST_W'(product(SUM_W'(step_q3), STEP_FACTOR));
       // stage 5
       m_first <= slope_q4 + step_q4;
       if (valid_q[4]) sum_before_q <= m_sum;

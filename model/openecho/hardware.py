@@ -318,7 +318,6 @@ MODULES: dict[str, Module] = {
         Module(name="crc", parameters=("SAMPLE_W",)),
         Module(name="fifo"),
         Module(name="multiply"),
-        Module(name="scale"),
         Module(name="square_root"),
         # IEEE-754 units, verified by tb/float, and their parts
         Module(name="float_add", parameters=_FLOAT, latency={"m": _add_latency}),
