@@ -378,8 +378,8 @@ def compress(files: tuple[Path, ...], output: Path | None, mode: str, bits: int 
     Waveforms, positions, times and shot numbers are kept; what else a file has, as references or the transmitted pulse,
     is not. The ratio is to samples of as many bits as they need, end to end.
     """
-    for file in files:
-        made = _compressed_name(file, output, several=len(files) > 1)
+    results = _compressed_names(files, output)
+    for file, made in zip(files, results, strict=True):
         job = batch.Compression(file, made, _codec().MODES.index(mode), bits, verify)
         start = time.perf_counter()
         try:
@@ -394,7 +394,8 @@ def compress(files: tuple[Path, ...], output: Path | None, mode: str, bits: int 
         raw = result.samples * result.bits / 8
         click.echo(
             f"{made}: {result.waveforms} waveforms, {result.samples} samples of {result.bits} bits in "
-            f"{8 * result.size / result.samples:.3f} each, ratio {raw / result.size:.3f}, {result.size} bytes, "
+            f"{8 * result.size / result.samples:.3f} each, ratio {raw / result.size:.3f}, "
+            f"{result.size} bytes of {file.stat().st_size}, "
             f"{result.samples / seconds / 1e6:.1f} million samples/s" + (", verified" if verify else "")
         )
 
@@ -534,18 +535,23 @@ def scene_schema(as_json: bool) -> None:
     click.echo(json.dumps(scenes.json_schema(), indent=2) if as_json else scenes.described())
 
 
-def _compressed_name(file: Path, output: Path | None, *, several: bool) -> Path:
-    """What a compressed file is called."""
+def _compressed_names(files: tuple[Path, ...], output: Path | None) -> list[Path]:
+    """What compressed files are called, each another than all others and than what is read."""
     if output is None:
-        made = file.with_suffix(".oec")
+        results = [file.with_suffix(".oec") for file in files]
     elif output.is_dir():
-        made = output / file.with_suffix(".oec").name
-    elif several:
+        results = [output / file.with_suffix(".oec").name for file in files]
+    elif len(files) > 1:
         raise click.UsageError(f"{output}: found no folder, expected one for several files")
     else:
-        made = output
-    _not_itself(file, made)
-    return made
+        results = [output]
+    before: dict[Path, Path] = {}
+    for file, made in zip(files, results, strict=True):
+        for other in files:
+            _not_itself(other, made)
+        if (first := before.setdefault(made.resolve(), file)) is not file:
+            raise click.UsageError(f"{made}: found it as the result of {first} and of {file}, expected one of each")
+    return results
 
 
 def _not_itself(file: Path, made: Path) -> None:

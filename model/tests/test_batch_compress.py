@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import resource
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +13,7 @@ import pytest
 from openecho import batch, codec, formats, stimulus
 from openecho.batch import Compression
 from openecho.formats import compressed
-from tests.test_cli import Run, refused, run  # noqa: F401, the fixture
+from tests.test_cli import PROGRAM, Run, refused, run  # noqa: F401, the fixture
 from tests.test_formats_hdf5 import lvis
 
 SMALL = 5000
@@ -83,7 +85,8 @@ def test_the_command_there_and_back(run: Run, source: Path) -> None:  # noqa: F8
     status, out, err = run("compress", source, "--verify")
     made = source.with_suffix(".oec")
     assert (status, err) == (0, "")
-    for part in (str(made), "40 waveforms", "31040 samples of 9 bits", "ratio 2.", "verified"):
+    sizes = f"{made.stat().st_size} bytes of {source.stat().st_size}"
+    for part in (str(made), "40 waveforms", "31040 samples of 9 bits", "ratio 2.", sizes, "verified"):
         assert part in out
     back = source.with_name("back.npz")
     assert run("decompress", made, "-o", back) == (0, f"{back}: 40 waveforms\n", "")
@@ -112,6 +115,36 @@ def test_several_files_into_a_folder(run: Run, source: Path) -> None:  # noqa: F
     status, out, _ = run("compress", source, other, "-o", folder, "--mode", "threshold")
     assert (status, out.count("\n")) == (0, 2)
     assert sorted(path.name for path in folder.iterdir()) == ["other.oec", "waveforms.oec"]
+
+
+def test_no_result_takes_the_place_of_another_or_of_a_source(run: Run, source: Path) -> None:  # noqa: F811
+    folder = source.with_name("folder")
+    folder.mkdir()
+    other = folder / source.name
+    other.write_bytes(source.read_bytes())
+    refused(run("compress", source, other, "-o", folder), "waveforms.oec: found it as the result of ", str(other))
+    refused(run("compress", source, source), "found it as the result of ")
+    assert run("compress", other)[0] == 0
+    again = run("compress", source, other.with_suffix(".oec"), "-o", folder)
+    refused(again, "found the same file for input and output")
+    assert sorted(path.name for path in folder.iterdir()) == ["waveforms.npz", "waveforms.oec"]
+
+
+def test_a_full_disk_is_told_in_one_line_and_leaves_no_half(source: Path) -> None:
+    def no_room() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))
+
+    whole = source.with_suffix(".oec")
+    batch.compress_file(Compression(source, whole, codec.PREDICTION))
+    rows = source.with_suffix(".npy")
+    with np.load(source) as arrays:
+        np.save(rows, arrays["samples"])
+    for verb, path, name in (("compress", rows, "made.oec"), ("decompress", whole, "b.npz")):
+        command: list[str | Path] = [PROGRAM, verb, path, "-o", source.with_name(name)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, preexec_fn=no_room)
+        refused((done.returncode, done.stdout, done.stderr), f"{source.with_name(name)}.partial", "File too large")
+        assert not source.with_name(name).exists()
+    assert not source.with_name("b.npz.partial").exists()
 
 
 def test_what_an_npz_has_no_place_for_is_told(run: Run, tmp_path: Path) -> None:  # noqa: F811

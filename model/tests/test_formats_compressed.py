@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
+import json
 import zlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,9 +15,13 @@ from hypothesis import strategies as st
 
 from openecho import batch, codec, formats
 from openecho.batch import Compression
+from openecho.batch.simulate import Simulation, simulate_file
 from openecho.formats import Block, Recording, compressed
+from openecho.scene.schema import bundled, changed, load
 from tests import fuzz
 from tests.test_formats_hdf5 import gedi, lvis
+from tests.test_formats_las import las
+from tests.test_formats_pulsewaves import OUTGOING, VARIABLE, pulsewaves
 
 
 def same(found: Block, expected: Block) -> None:
@@ -71,7 +77,9 @@ def test_recorded_files_come_back(mode: int, name: str, recorded: Path, tmp_path
 def test_everything_that_a_recording_tells_is_kept(tmp_path: Path) -> None:
     lvis(tmp_path / "lvis.h5", 432, 431)
     gedi(tmp_path / "gedi.h5", {"BEAM0000": [70, 50, 30], "BEAM0101": [20, 90]})
-    for name in ("lvis.h5", "gedi.h5"):
+    las(tmp_path / "waves.las")
+    pulsewaves(tmp_path / "waves.pls", [OUTGOING, VARIABLE])
+    for name in ("lvis.h5", "gedi.h5", "waves.las", "waves.pls"):
         made = packed(tmp_path / name, f"{name}.oec")
         with formats.open(tmp_path / name) as source, formats.open(made) as found:
             for field in compressed.TELLS:
@@ -79,6 +87,16 @@ def test_everything_that_a_recording_tells_is_kept(tmp_path: Path) -> None:
                 assert getattr(found, field) == (f"{expected}, compressed" if field == "format" else expected)
             assert [block.beam for block in found.blocks(2)] == [block.beam for block in source.blocks(2)]
             for one, other in zip(found.blocks(2), source.blocks(2), strict=True):
+                same(one, other)
+
+
+@pytest.mark.parametrize("name", bundled())
+def test_what_was_simulated_comes_back(name: str, tmp_path: Path) -> None:
+    source = tmp_path / "simulated.npz"
+    simulate_file(Simulation(changed(load(name), shots=8), source))
+    for mode in (codec.PREDICTION, codec.THRESHOLD):
+        with formats.open(source) as before, formats.open(packed(source, mode=mode)) as found:
+            for one, other in zip(found.blocks(7), before.blocks(7), strict=True):
                 same(one, other)
 
 
@@ -133,7 +151,8 @@ def test_a_file_cut_anywhere_is_refused(tmp_path: Path) -> None:
             formats.open(cut)
 
 
-def _bytes_of_a_small_file() -> bytes:
+def _bytes_of_a_small_file(**changed: Any) -> bytes:
+    """Three waveforms in two chunks, and a head of which some values are others; its checksum is right."""
     rng = np.random.default_rng(3)
     length = np.array([30, 40, 20], np.int32)
     samples = np.rint(20 + rng.normal(0, 2, (3, 40))).astype(np.uint16)
@@ -142,7 +161,9 @@ def _bytes_of_a_small_file() -> bytes:
     recording = Recording(Path(), "x", 3, 40, parts=((None, 3),), reader=None, closer=None, **told)  # type: ignore[arg-type]
     file = io.BytesIO()
     chunks = ((first, compressed.pack_chunk(block, 8, codec.PREDICTION)) for first, block in blocks.items())
-    compressed.write(file, compressed.head(recording, 8), chunks)
+    head = compressed.head(recording, 8)
+    text = json.dumps(json.loads(head[12:-4]) | changed).encode()
+    compressed.write(file, head[:8] + compressed._sealed(len(text).to_bytes(4) + text), chunks)
     return file.getvalue()
 
 
@@ -190,7 +211,7 @@ def test_what_this_version_does_not_know_is_told(at: int, value: int, message: s
     [
         (5, 0x12, "byte 0: mode 2, expected 0 to 1"),
         (5, 0x21, "byte 0: version 2, expected 1"),
-        (6, 0xF0, "samples of other bits than in the head"),
+        (6, 0xF0, "samples of 16 bits, expected 8, as in the head"),
         (3, 9, "9 waveforms, columns 0, expected 2"),
         (4, 8, "columns 8, expected 2"),
     ],
@@ -203,3 +224,44 @@ def test_chunks_that_are_sealed_and_wrong_are_told(at: int, value: int, message:
     with formats.open(tmp_path / "a.oec") as recording, pytest.raises(formats.DataError, match=message) as error:
         recording.read(0, 1)
     assert f"byte {chunk}" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("told", "message"),
+    [
+        ({"waveforms": 0}, "byte 12: waveforms 0, expected 1 or more"),
+        ({"waveforms": "3"}, "byte 12: waveforms '3', expected 1 or more"),
+        ({"waveforms": 4}, "byte 12: beams of 3 waveforms, expected 4 in all"),
+        ({"waveforms": 4, "parts": [[None, 4]]}, "1 waveforms, columns 0, expected 2"),
+        ({"waveforms": 10**15, "parts": [[None, 10**15]]}, "1000000000000000 waveforms in 118 bytes"),
+        ({"waveforms": 10**30, "parts": [[None, 10**30]]}, "byte 12: waveforms 10{30}, expected"),
+        ({"parts": [[None, -1], [None, 4]]}, "byte 12: parts .+, expected a name or null and 1 or more waveforms"),
+        ({"parts": [[None, 1.5], [None, 1.5]]}, "byte 12: parts "),
+        ({"parts": []}, "byte 12: beams of 0 waveforms, expected 3"),
+        ({"longest": 0}, "byte 12: longest 0, expected 1 to 65536"),
+        ({"longest": 65537}, "byte 12: longest 65537, expected 1 to 65536"),
+        ({"longest": 40.5}, "byte 12: longest 40.5, expected 1 to 65536"),
+        ({"longest": 39}, "lengths of 30 to 40, expected 1 to 39"),
+        ({"bits": 17}, "byte 12: bits 17, expected 1 to 16"),
+        ({"bits": None}, "byte 12: bits None, expected 1 to 16"),
+        ({"bits": 9}, "samples of 8 bits, expected 9"),
+        ({"bin_ns": -1}, "byte 12: bin_ns -1, expected a number above 0"),
+        ({"bin_ns": float("nan")}, "byte 12: bin_ns nan, expected a number above 0"),
+        ({"bin_ns": [1]}, r"byte 12: bin_ns \[1\], expected a number above 0"),
+        ({"volts": [1]}, r"byte 12: volts \[1\], expected two numbers"),
+        ({"resolution": "abc"}, "byte 12: resolution 'abc', expected three numbers"),
+        ({"wkt": 5}, "byte 12: wkt 5, expected text"),
+        ({"format": "a\nb"}, r"byte 12: format 'a\\\\nb', expected a line of text"),
+        ({"time_unit": "seconds"}, "columns 0, expected also 1, as the head says"),
+        ({"coordinates": "x, y, z (metres)"}, "columns 0, expected also 2, as the head says"),
+    ],
+)
+def test_heads_that_are_sealed_and_wrong_are_told(told: dict[str, Any], message: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.oec"
+    path.write_bytes(_bytes_of_a_small_file(**told))
+    with pytest.raises(formats.DataError, match=message) as error:
+        fuzz.read_all(path)
+    assert "\n" not in str(error.value)
+    with pytest.raises(formats.DataError, match=message):
+        batch.decompress_file(path, tmp_path / "a.npz")
+    assert [left.name for left in tmp_path.iterdir()] == ["a.oec"]

@@ -1,4 +1,4 @@
-"""CRC-32 of a record's samples."""
+"""Checksum of a record's samples."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from openecho.compiled import njit
 
 POLYNOMIAL = 0x00400007
+"""z^32 + z^22 + z^2 + z + 1, without its highest term: see `openecho.codec`."""
 ALL_ONES = 0xFFFFFFFF
 
 
 def checksum(samples: NDArray[np.uint16], bits: int) -> int:
-    """CRC-32 with the polynomial of Ethernet, highest bit first, from all ones, not inverted; `bits` of each sample."""
+    """CRC of 32 bits, of `bits` of each sample, highest first, from all ones, not inverted."""
     return int(_divide(samples, bits, _remainders(bits)))
 
 

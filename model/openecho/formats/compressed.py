@@ -23,8 +23,8 @@ end     8               ``OECINDEX``
 ======= =============== ==============================================================================================
 
 A column is compressed by zlib: differences from row to row, of the bits of floats as integers, the bytes of equal
-weight together. Chunks are of one beam each. What a file has beside its `Recording`, as references or the transmitted
-pulse, is not kept.
+weight together. A chunk is of one beam, and has one waveform or at most 2^18 samples, as if all were of the longest.
+What a file has beside its `Recording`, as references or the transmitted pulse, is not kept.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ import io
 import json
 import struct
 import zlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -43,12 +43,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from openecho.formats.recording import (
+    LARGEST_COUNT,
     MAX_LENGTH,
     Block,
     DataError,
     Geolocation,
     Recording,
-    check_waveforms,
     one_line,
     printable,
 )
@@ -63,6 +63,43 @@ FORM_BYTES = 8
 TIME, PLACE, SHOT = 1, 2, 4
 TELLS = ("format", "waveforms", "longest", "bin_ns", "coordinates", "time_unit", "volts", "parts", "resolution", "wkt")
 """Fields of `Recording` that are kept."""
+
+
+def _whole(value: Any, least: int, most: int) -> bool:
+    return type(value) is int and least <= value <= most
+
+
+def _numbers(value: Any, count: int) -> bool:
+    return isinstance(value, list) and len(value) == count and all(type(one) in (int, float) for one in value)
+
+
+def _line(value: Any) -> bool:
+    return isinstance(value, str) and value.isprintable()
+
+
+def _beams(value: Any) -> bool:
+    return isinstance(value, list) and all(
+        isinstance(beam, list) and len(beam) == 2 and isinstance(beam[0], str | None) and _whole(beam[1], 1, 2**63 - 1)
+        for beam in value
+    )
+
+
+NEEDED: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "bits": (lambda value: _whole(value, 1, LARGEST_COUNT.bit_length()), f"1 to {LARGEST_COUNT.bit_length()}"),
+    "format": (_line, "a line of text"),
+    "waveforms": (lambda value: _whole(value, 1, 2**63 - 1), "1 or more"),
+    "longest": (lambda value: _whole(value, 1, MAX_LENGTH), f"1 to {MAX_LENGTH}"),
+    "parts": (_beams, "a name or null and 1 or more waveforms, each"),
+}
+KNOWN: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "bin_ns": (lambda value: _numbers([value], 1) and 0 < value < float("inf"), "a number above 0"),
+    "coordinates": (_line, "a line of text"),
+    "time_unit": (_line, "a line of text"),
+    "volts": (lambda value: _numbers(value, 2), "two numbers"),
+    "resolution": (lambda value: _numbers(value, 3), "three numbers"),
+    "wkt": (lambda value: isinstance(value, str), "text"),
+}
+"""What a head always has, and what it may have or not: whether a value can be, and what an error says of it."""
 
 
 def head(recording: Recording, bits: int) -> bytes:
@@ -140,11 +177,16 @@ def open_compressed(path: Path) -> Recording:
 
 @dataclass(frozen=True)
 class _Chunks:
-    """An open file and where its chunks are: bytes and first waveforms, each with the end of the last."""
+    """An open file, what its head says of every chunk, and their bytes and first waveforms, each with the last's end.
+
+    `columns` are those that every chunk has; a beam may have more.
+    """
 
     path: Path
     file: IO[bytes]
     bits: int
+    longest: int
+    columns: int
     starts: NDArray[np.int64]
     firsts: NDArray[np.int64]
 
@@ -169,18 +211,31 @@ def _recording(path: Path, file: IO[bytes]) -> Recording:
     if length > min(size, LARGEST_HEAD):
         raise _damaged(path, at, f"a head of {length} bytes", f"at most {min(size, LARGEST_HEAD)}")
     text = _unsealed(path, at, start[-4:] + file.read(length + 4))[4:]
-    with one_line(path, f"a head in JSON at byte {at + 4}"):
-        told = json.loads(text)
-        bits, told = told["bits"], {name: told.get(name) for name in TELLS}
-        told |= {key: None if told[key] is None else tuple(told[key]) for key in ("volts", "resolution")}
-        told["parts"] = tuple((name, count) for name, count in told["parts"])
-    check_waveforms(path, told["waveforms"], told["longest"])
-    if sum(count for _, count in told["parts"]) != told["waveforms"]:
-        raise _damaged(path, at, f"beams of {told['parts']} waveforms", f"{told['waveforms']} in all")
+    bits, told = _told(path, at + 4, text)
     starts, firsts = _index(path, file, size, file.tell(), told["waveforms"])
-    chunks = _Chunks(path, file, bits, starts, firsts)
+    columns = TIME * (told["time_unit"] is not None) | PLACE * (told["coordinates"] is not None)
+    chunks = _Chunks(path, file, bits, told["longest"], columns, starts, firsts)
     told["format"] = f"{told['format']}, compressed"
     return Recording(path=path, reader=partial(_read, chunks, told["parts"]), closer=file.close, **told)
+
+
+def _told(path: Path, at: int, text: bytes) -> tuple[int, dict[str, Any]]:
+    """Bits of a sample, and fields of a `Recording`, each of a type and in a range that it can have."""
+    with one_line(path, f"a head in JSON at byte {at}"):
+        found = json.loads(text)
+    if not isinstance(found, dict):
+        raise _damaged(path, at, "a head that has no keys", "one with keys")
+    for name, (sound, expected) in {**NEEDED, **KNOWN}.items():
+        value = found.get(name)
+        if not sound(value) and (value is not None or name in NEEDED):
+            raise _damaged(path, at, f"{name} {printable(repr(value))}", expected)
+    told: dict[str, Any] = {name: found.get(name) for name in TELLS}
+    told |= {name: None if told[name] is None else tuple(told[name]) for name in ("volts", "resolution")}
+    told["parts"] = tuple((name, count) for name, count in found["parts"])
+    total = sum(count for _, count in told["parts"])
+    if total != told["waveforms"]:
+        raise _damaged(path, at, f"beams of {total} waveforms", f"{told['waveforms']} in all")
+    return found["bits"], told
 
 
 def _index(
@@ -201,6 +256,9 @@ def _index(
     starts, firsts = np.append(entries[:, 0], at), np.append(entries[:, 1], waveforms)
     if starts[0] != start or firsts[0] != 0 or (np.diff(starts) <= 0).any() or (np.diff(firsts) <= 0).any():
         raise _damaged(path, at, "chunks out of order", "each behind the one before")
+    # So that what is made room for by their number is bounded by the file.
+    if (np.diff(firsts) > np.diff(starts)).any():
+        raise _damaged(path, at, f"{waveforms} waveforms in {at - start} bytes", "a byte for each, in every chunk")
     return starts, firsts
 
 
@@ -270,11 +328,13 @@ def _unpack_chunk(chunks: _Chunks, at: int, data: bytes, first: int, count: int)
     found, flags = struct.unpack(">IB", body[:5])
     if found != count or flags & ~(TIME | PLACE | SHOT):
         raise _damaged(path, at, f"{found} waveforms, columns {flags}", f"{count}, as the index says, and 0 to 7")
+    if chunks.columns & ~flags:
+        raise _damaged(path, at, f"columns {flags}", f"also {chunks.columns & ~flags}, as the head says")
     try:
         form = codec.Form.parse(body[5:fixed])
         parts = _parts(path, at, body, fixed, 2 + bin(flags & (TIME | SHOT)).count("1") + 2 * bool(flags & PLACE))
         length = _unpacked(path, at, parts[0], np.dtype(np.int32), (count,))
-        _check_lengths(path, at, length, len(parts[1]), form.bits == chunks.bits)
+        _check_lengths(chunks, at, length, len(parts[1]), form.bits)
         samples = codec.unpack(parts[1], length, form)
     except codec.CodecError as error:
         raise DataError(f"{path}: chunk at byte {at}: {error}") from error
@@ -300,14 +360,14 @@ def _parts(path: Path, at: int, body: bytes, start: int, count: int) -> list[byt
     return parts
 
 
-def _check_lengths(path: Path, at: int, length: NDArray[np.int32], payload: int, same_bits: bool) -> None:
+def _check_lengths(chunks: _Chunks, at: int, length: NDArray[np.int32], payload: int, bits: int) -> None:
     """Refuse lengths that the payload can't have, for a sample takes a bit, before room is made for their samples."""
-    longest = int(length.max())
-    if not same_bits:
-        raise _damaged(path, at, "samples of other bits than in the head", "the same")
-    if not 1 <= length.min() <= longest <= MAX_LENGTH or int(length.sum(dtype=np.int64)) > 8 * payload:
+    path, longest = chunks.path, int(length.max())
+    if bits != chunks.bits:
+        raise _damaged(path, at, f"samples of {bits} bits", f"{chunks.bits}, as in the head")
+    if not 1 <= length.min() <= longest <= chunks.longest or int(length.sum(dtype=np.int64)) > 8 * payload:
         raise _damaged(
-            path, at, f"lengths of {length.min()} to {longest}", f"1 to {MAX_LENGTH}, as the payload has bits"
+            path, at, f"lengths of {length.min()} to {longest}", f"1 to {chunks.longest}, as the payload has bits"
         )
     if len(length) > 1 and longest * len(length) > CHUNK:
         raise _damaged(path, at, f"{len(length)} waveforms of up to {longest} samples", f"at most {CHUNK} samples")
