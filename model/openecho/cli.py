@@ -543,6 +543,8 @@ def _compressed_names(files: tuple[Path, ...], output: Path | None) -> list[Path
         results = [output / file.with_suffix(".oec").name for file in files]
     elif len(files) > 1:
         raise click.UsageError(f"{output}: found no folder, expected one for several files")
+    elif output.suffix.lower() != ".oec":
+        raise click.UsageError(f"{output}: found the suffix {output.suffix or 'none'}, expected .oec")
     else:
         results = [output]
     before: dict[Path, Path] = {}

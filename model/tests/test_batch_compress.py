@@ -164,7 +164,7 @@ def test_what_an_npz_has_no_place_for_is_told(run: Run, tmp_path: Path) -> None:
         (["compress", "{source}", "--bits", "0"], ["--bits", "1<=x<=16"]),
         (["compress", "{source}", "--bits", "17"], ["--bits", "1<=x<=16"]),
         (["compress", "{source}", "--mode", "x"], ["--mode", "prediction", "threshold"]),
-        (["compress", "{source}", "-o", "{source}"], ["found the same file for input and output"]),
+        (["compress", "{source}", "-o", "{folder}/a.npz"], ["a.npz: found the suffix .npz, expected .oec"]),
         (["compress", "{source}", "{source}", "-o", "{folder}/a.oec"], ["expected one for several files"]),
         (["compress", "{source}", "-o", "{folder}/no/a.oec"], ["no/a.oec: no folder"]),
         (["compress", "{folder}/missing.h5"], ["missing.h5: no such file"]),
