@@ -10,7 +10,7 @@ import math
 import os
 import statistics
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,21 +20,19 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
-from scipy.optimize import least_squares
 
 from openecho import formats, report
 from openecho.batch.simulate import Simulation, simulate_file
 from openecho.decompose import Method, prepare
 from openecho.formats.references import Reference
 from openecho.scene.geometry.flight import beams
-from openecho.scene.instrument import Instrument
-from openecho.scene.physics.pulse import STEPS, laser
 from openecho.scene.plan import MOST_RAYS
 from openecho.scene.returns import Rays, returns
-from openecho.scene.schema import Scene, bundled, load
+from openecho.scene.schema import bundled, load
 from openecho.scene.simulate import Simulator, blocks, simulate, simulator
 from openecho.study.figure import FILTERED, FOUND, save
 from openecho.study.score import score
+from openecho.study.truth import LAGS, MISFIT, resolved, told_of_scene
 
 Floats = NDArray[np.float64]
 
@@ -43,12 +41,6 @@ METHODS = {"core": "inflection", "Gaussian": "gaussian", "V–L": "vl"}
 
 TRIED = 2000
 """Waveforms of each scene that the methods are tried on."""
-
-MISFIT = 0.01
-"""Share of its height by which an echo differs from the pulse at least: that of a slope, or of leaves."""
-
-DETECTABLE = 5.0
-"""Deviations of the noise that an echo is high which a method is asked for."""
 
 COMPARED = 512
 """Waveforms of each scene that are traced as planned and in full."""
@@ -65,44 +57,9 @@ RECORDED, LIKE = "gedi_cerrado.npz", "savanna"
 NARROW = 4.0
 """σ of a pulse, bins, up to which the core's sharpest filter suits it; above, that for GEDI's does."""
 
-NOISE_SAMPLES, LAGS = 50, 6
+NOISE_SAMPLES = 50
 
 PERCENTILES = (5, 25, 50, 75, 95)
-
-
-def resolved(scene: Scene, ready: Simulator, truth: np.ndarray) -> Reference:
-    """Echoes that can be told apart and from noise.
-
-    Surfaces less than the pulse's FWHM apart are one echo, where the mean of their light is.
-
-    Parameters
-    ----------
-    scene : Scene
-    ready : Simulator
-        That of the scene.
-    truth : structured (k,)
-        Of `openecho.scene.simulate.TRUTH`.
-
-    Returns
-    -------
-    Reference
-        The ground is the last of those surfaces that are no leaves.
-    """
-    chain, waveforms = ready.instrument, scene.shots * scene.beams
-    spread = np.hypot(truth["spread"] / chain.bin, chain.deviation)
-    area = truth["energy"] * scene.digitiser.gain * scene.digitiser.rate
-    first = np.ones(len(truth), np.bool_)
-    first[1:] = (np.diff(truth["waveform"]) > 0) | (np.diff(truth["bin"]) > chain.fwhm)
-    echo = np.cumsum(first) - 1
-    light, height = np.bincount(echo, area), np.bincount(echo, area / spread) / math.sqrt(2 * math.pi)
-    position = np.bincount(echo, area * truth["bin"]) / light
-    waveform = truth["waveform"][first]
-    seen = height > DETECTABLE * np.sqrt(chain.dark + chain.shot * height)
-    seen &= (position > 0) & (position < scene.digitiser.samples - 1)
-    ground = np.full(waveforms, np.nan)
-    solid = truth[~np.isnan(truth["incidence"])]
-    ground[solid["waveform"]] = solid["bin"]  # the last of each stays
-    return Reference("truth", waveform[seen], position[seen], ground, np.ones(waveforms, np.bool_))
 
 
 def judge(name: str, folder: Path, seed: int) -> dict[str, Any]:
@@ -114,8 +71,10 @@ def judge(name: str, folder: Path, seed: int) -> dict[str, Any]:
     simulate_file(Simulation(scene, path))
     ready = simulator(scene)
     with np.load(path) as file:
-        reference = resolved(scene, ready, file["truth"])
-    row: dict[str, Any] = {"scene": name, "waveforms": scene.shots * scene.beams, "echoes": len(reference.waveform)}
+        echoes, ground = resolved(scene, ready, file["truth"])
+    waveforms = scene.shots * scene.beams
+    reference = Reference("truth", echoes["waveform"], echoes["centre"], ground, np.ones(waveforms, np.bool_))
+    row: dict[str, Any] = {"scene": name, "waveforms": waveforms, "echoes": len(echoes)}
     with formats.open(path) as recording:
         for method, own in METHODS.items():
             found = score(recording, [reference], _method(own, ready, recording.longest))
@@ -125,35 +84,10 @@ def judge(name: str, folder: Path, seed: int) -> dict[str, Any]:
 
 def _method(name: str, ready: Simulator, longest: int) -> Method:
     """A method that is told of the pulse; the fits also how far that is from their shape, and how noise is coloured."""
-    chain, rate = ready.instrument, ready.scene.digitiser.rate
+    chain = ready.instrument
     if name == "inflection":
         return prepare(name, longest, {"taps": "nasa3.5" if chain.deviation < NARROW else "gedi", "k": 4.0})
-    # The response's autocorrelation, exp(-t²/4σ²) with σ = √(ln 2)/(2πB).
-    lag = np.arange(LAGS) / rate * math.pi * ready.scene.receiver.bandwidth / math.sqrt(math.log(2))
-    # To digits that no machine rounds differently: an echo more or less may hang on the last.
-    width, misfit = (round(value, 4) for value in shaped(chain, normal if name == "gaussian" else asymmetric))
-    known = {"width": width, "correlation": tuple(np.exp(-(lag**2)).tolist()), "misfit": max(misfit, MISFIT)}
-    return prepare(name, longest, known)
-
-
-def normal(x: Floats, height: float, at: float, width: float) -> Floats:
-    """Gaussian of σ `width`."""
-    return np.asarray(height * np.exp(-0.5 * ((x - at) / width) ** 2))
-
-
-def asymmetric(x: Floats, height: float, at: float, width: float) -> Floats:
-    """Laser's pulse of √2 τ `width`."""
-    return np.asarray(height * laser((x - at) * math.sqrt(2) / width + 2) / laser(2.0))
-
-
-def shaped(chain: Instrument, shape: Callable[..., Floats]) -> tuple[float, float]:
-    """Width, bins, of the curve that fits the recorded pulse best, and the RMS that it leaves of the pulse's height."""
-    pulse = chain.pulse[::-1].T.ravel()  # a later row is earlier in the pulse
-    x = (np.arange(len(pulse)) - pulse.argmax()) / STEPS
-    near = abs(x) < 2 * chain.fwhm
-    x, pulse = x[near], pulse[near] / pulse.max()
-    found = least_squares(lambda known: shape(x, *known) - pulse, (1.0, 0.0, chain.fwhm / 2.355))
-    return float(found.x[2]), float(np.sqrt((found.fun**2).mean()))
+    return prepare(name, longest, told_of_scene(chain)["gaussian" if name == "gaussian" else "laser"])
 
 
 def fidelity(name: str) -> dict[str, Any]:
