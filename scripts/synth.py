@@ -18,11 +18,13 @@ import hashlib
 import importlib.util
 import inspect
 import json
+import os
 import re
 import statistics
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -67,7 +69,7 @@ class Build:
         """Name of the arithmetic, or of the float unit's format."""
         form = self.built_as.form
         found = {pair: name for name, pair in ARITHMETICS.items()}
-        return "fixed" if form is None else found[form.exp_w, form.frac_w]
+        return "fixed" if form is None else found.get((form.exp_w, form.frac_w), f"{form.exp_w}, {form.frac_w}")
 
     @property
     def budget(self) -> hardware.Budget | None:
@@ -187,7 +189,7 @@ def kept_folder(build: Build, versions: Mapping[str, str], *flow: str) -> Path:
     """
     sources = {source.name: source.read_text() for source in MODULES[build.module].sources}
     content = json.dumps([sources, build.parameters, versions, flow], sort_keys=True)
-    folder = KEPT / f"{build.name.replace(' ', '_')}-{hashlib.sha256(content.encode()).hexdigest()[:16]}"
+    folder = KEPT / f"{build.module}-{hashlib.sha256(content.encode()).hexdigest()[:16]}"
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in sources.items():
         (folder / name).write_text(text)
@@ -335,15 +337,28 @@ def clocks(build: Build, seeds: Sequence[int], versions: Mapping[str, str], prog
     return {"mhz": mhz, "fmax_mhz": round(statistics.median(mhz.values()), 1)}
 
 
-def rows(job: Job, versions: Mapping[str, str], progress: Progress) -> Iterator[dict[str, Any]]:
-    """Make each build and yield its row of the report; raise SynthesisError."""
-    task = progress.add_task("", total=len(job.builds))
-    for build in job.builds:
-        progress.update(task, description=build.name)
+def rows(
+    builds: Sequence[Build], seeds: Sequence[int], versions: Mapping[str, str], progress: Progress
+) -> Iterator[dict[str, Any]]:
+    """Make builds, as many at a time as there are processors, and yield the row of each; raise SynthesisError.
+
+    Those that are marked for a clock are routed with these seeds.
+    """
+    task = progress.add_task("synthesis", total=len(builds))
+
+    def made(build: Build) -> dict[str, Any]:
         named = {"name": build.name, "top": MODULES[build.module].top, "arithmetic": build.arithmetic, "target": "xc7"}
         row = {**named, "parameters": build.parameters, **area(build, versions)}
-        yield row | clocks(build, job.seeds if build.clock else (), versions, progress)
+        row |= clocks(build, seeds if build.clock else (), versions, progress)
         progress.advance(task)
+        return row
+
+    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+        try:
+            yield from pool.map(made, builds)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)  # what waits is not begun
+            raise
 
 
 def show(table_rows: Sequence[Mapping[str, Any]], console: Console) -> None:
@@ -382,7 +397,7 @@ def main() -> int:
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
     try:
         with Progress(*columns, console=console) as progress:
-            made = list(rows(job, versions, progress))
+            made = list(rows(job.builds, job.seeds, versions, progress))
     except SynthesisError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
