@@ -80,7 +80,7 @@ scenes: $(READY) ## methods against the truth of every bundled scene, its plan a
 compression: $(READY) ## bits a sample and speed of the lossless codec beside zlib, zstd and xz, on recorded files
 	@$(RUN) -m openecho.study.compression
 
-trade: $(if $(filter quick,$(TRADE)),$(READY),$(VENV)/.synth) ## what speed costs: every way to decompose, its accuracy, area and speed; half an hour [TRADE=quick] [SEED=]
+trade: $(if $(filter quick,$(TRADE)),$(READY),$(VENV)/.synth) ## what speed costs: every way to decompose, its accuracy, area and speed; 20 minutes [TRADE=quick] [SEED=]
 	@$(RUN) scripts/ways.py --extent '$(TRADE)'
 	@$(RUN) -m openecho.study.trade --extent '$(TRADE)' $(if $(SEED),--seed '$(SEED)')
 

@@ -215,12 +215,12 @@ def _taps(numbers: Numbers) -> str:
 
 def _fits(numbers: Numbers) -> str:
     fast, slow = numbers.ways[USUAL]["waveforms_per_s"], numbers.ways["Gaussian"]["software_per_s"]
-    times = "" if fast is None else f", a {fast / slow:,.0f}th of the core's rate"
+    beside = "" if fast is None else f" (the core {fast / slow:,.0f} times as many)"
     return (
         f"A fit is worth its time where echoes overlap or their shape is known: Gaussians are at "
         f"{numbers.peak('Gaussian', 'land', 'bound'):.2f} times the bound on land and V–L has roofs to "
         f"{numbers.peak('V–L', 'roofs'):.2f} bin where the core has {numbers.peak(USUAL, 'roofs'):.2f}, at "
-        f"{slow:,.0f} land waveforms a second on one core of the processor{times}."
+        f"{slow:,.0f} land waveforms a second on one core of a processor{beside}."
     )
 
 
