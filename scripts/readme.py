@@ -321,16 +321,16 @@ def choice(content: dict[str, Any]) -> list[str]:
 def paper(content: dict[str, Any]) -> list[str]:
     """The paper's comparison beside ours."""
     rows = [(label, f"{ms:.3g}", f"{1e3 / ms:,.0f}") for label, ms in content["paper"]["rows"]]
-    ratios = "; ".join(f"{name} {ratio:,.0f} times" for name, ratio in content["paper"]["ratios"].items())
+    ratios = "; ".join(f"{name} {ratio:,.1f} times" for name, ratio in content["paper"]["ratios"].items())
     return [*table(("", "ms a waveform", "waveforms a second"), rows), "", f"Hardware over software: {ratios}."]
 
 
 def limits(content: dict[str, Any]) -> list[str]:
     """What was tried at the extremes, what is guaranteed, and what was found."""
-    rows = [f"| {row['name']} | {row['guarantee']} | {row['found']} |" for row in content["rows"]]
+    rows = [f"| {row['area']} | {row['name']} | {row['guarantee']} | {row['found']} |" for row in content["rows"]]
     versions = ", ".join(f"{name} {version}" for name, version in content["tools"].items())
     made = f"{content['date']}, seed {content['seed']}, {versions}."
-    return ["| tried | guaranteed | found |", "| --- | --- | --- |", *rows, "", made]
+    return ["| | tried | guaranteed | found |", "| --- | --- | --- | --- |", *rows, "", made]
 
 
 LONG_PARTS: dict[str, tuple[str, Callable[[dict[str, Any]], list[str]]]] = {

@@ -436,7 +436,7 @@ def _paper(content: Content) -> page.Section:
     """The paper's times beside ours."""
     paper, machine = content["paper"], content["machine"]
     times = [(label, number(ms), number(1000 / ms if ms else None)) for label, ms in paper["rows"]]
-    ratios = [(whose, number(ratio)) for whose, ratio in paper["ratios"].items()]
+    ratios = [(whose, number(ratio, 4)) for whose, ratio in paper["ratios"].items()]
     return page.Section(
         "Beside the paper",
         "The paper's two times are its own, on a PC and an FPGA that we do not have. Our software's is on one core of "
