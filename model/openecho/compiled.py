@@ -23,7 +23,7 @@ __all__ = ["njit", "share"]
 config: Any = numba.config
 
 PACKAGE = Path(__file__).parent
-ROOMS = ("codec", "decompose", "enhance", "scene")
+ROOMS = ("codec", "decompose", "enhance", "scene", "surface")
 """Where there are functions to compile."""
 
 WORTH_A_THREAD = 64
