@@ -223,7 +223,7 @@ def _classified(points: Floats, corners: Floats, frame: Floats, chosen: Filter) 
         return np.isin(points, corners).all(axis=1)
     _, above, _, _ = _heights(points, network, triangles)
     likely = (above >= -chosen.tolerance) & (above <= 2 * chosen.tolerance)
-    raised = abs(above - np.median(above[likely])) <= chosen.tolerance
+    raised = np.asarray(abs(above - np.median(above[likely])) <= chosen.tolerance)
     means = np.concatenate([_means(points[likely], chosen.spacing), frame])
     triangles = _triangulated(means)
     if triangles is None:
