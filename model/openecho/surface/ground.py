@@ -20,7 +20,7 @@ from os import sched_getaffinity
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import Delaunay, QhullError, cKDTree
+from scipy.spatial import Delaunay, cKDTree
 
 from openecho.compiled import njit
 
@@ -196,10 +196,7 @@ def _corners(points: Floats, seeds: Bools, frame: Floats, chosen: Filter) -> Int
     for square in _squares(chosen):
         for _ in range(PASSES):
             network = np.concatenate([points[corner], frame])
-            triangles = _triangulated(network)
-            if triangles is None:
-                return corner
-            above, near = _joins(points[left], network, triangles, chosen)
+            above, near = _joins(points[left], network, _triangulated(network), chosen)
             far = cKDTree(network[:, :2]).query(points[left, :2], distance_upper_bound=square / 2)[0] >= square / 2
             able = np.flatnonzero(near & far)
             new = able[_first_of_each(points[left[able], :2], above[able], square)]
@@ -218,17 +215,11 @@ def _classified(points: Floats, corners: Floats, frame: Floats, chosen: Filter) 
     At a step the means are of no use.
     """
     network = np.concatenate([corners, frame])
-    triangles = _triangulated(network)
-    if triangles is None:
-        return np.isin(points, corners).all(axis=1)
-    _, above, _, _ = _heights(points, network, triangles)
+    _, above, _, _ = _heights(points, network, _triangulated(network))
     likely = (above >= -chosen.tolerance) & (above <= 2 * chosen.tolerance)
     raised = np.asarray(abs(above - np.median(above[likely])) <= chosen.tolerance)
     means = np.concatenate([_means(points[likely], chosen.spacing), frame])
-    triangles = _triangulated(means)
-    if triangles is None:
-        return raised
-    distance, _, _, _ = _heights(points, means, triangles)
+    distance, _, _, _ = _heights(points, means, _triangulated(means))
     return np.asarray(raised | (distance <= chosen.tolerance))
 
 
@@ -245,12 +236,9 @@ def _squares(chosen: Filter) -> list[float]:
     return [max(chosen.cell / 2**k, chosen.spacing) for k in range(1, count + 1)]
 
 
-def _triangulated(network: Floats) -> Delaunay | None:
-    """Triangles of the network; none if it has no area."""
-    try:
-        return Delaunay(network[:, :2])
-    except (QhullError, ValueError):
-        return None
+def _triangulated(network: Floats) -> Delaunay:
+    """Triangles of the network, which has an area, for the frame has."""
+    return Delaunay(network[:, :2])
 
 
 def _joins(points: Floats, network: Floats, triangles: Delaunay, chosen: Filter) -> tuple[Floats, Bools]:
