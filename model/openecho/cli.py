@@ -423,6 +423,56 @@ def decompress(file: Path, output: Path | None) -> None:
     click.echo(f"{made}: {waveforms} waveforms")
 
 
+def _a_file(meaning: str, *names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Option of another file to write."""
+    return click.option(*names, type=click.Path(path_type=Path), callback=in_folder, help=meaning)
+
+
+@openecho.command()
+@click.argument("echoes", type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), required=True, callback=in_folder, help="Elevation model, .tif."
+)
+@_a_file("Heights of the highest points, .tif.", "--dsm")
+@_a_file("Heights over the ground, .tif.", "--canopy")
+@_a_file("Light on the ground, .tif.", "--hillshade")
+@_a_file("All points with their classes, .las or .laz.", "--points")
+@_a_file("Triangles of the ground, .ply.", "--mesh")
+@click.option("--cell", type=float, default=1.0, show_default=True, help="Side of a grid's squares, m.")
+@click.option("--smoothing", type=click.FloatRange(0), default=0.0, show_default=True, help="σ over the heights, m.")
+@click.option("--reach", type=click.FloatRange(0, min_open=True), help="How far from points heights go, m.")
+@click.option("--building", type=float, default=25.0, show_default=True, help="Longer than any building, m.")
+@click.option("--angle", type=float, default=8.0, show_default=True, help="Under which ground is seen, degrees.")
+@click.option("--distance", type=float, default=1.4, show_default=True, help="Of new ground from what is known, m.")
+@click.option("--spacing", type=float, default=1.5, show_default=True, help="Of the corners of the network, m.")
+@click.option("--tolerance", type=float, default=0.3, show_default=True, help="Of ground about the network, m.")
+@click.option("--lowest", type=float, help="Height that is believed, m.")
+@click.option("--highest", type=float, help="Height that is believed, m.")
+@click.option("--system", metavar="EPSG:NUMBER", help="Coordinate system, or what to project degrees into.")
+@click.option("--jobs", type=click.IntRange(1), help="Processes on this machine.  [default: 1]")
+@click.option("--scheduler", metavar="ADDRESS", help="Hand the tiles to this Dask cluster, as tcp://host:8786.")
+def surface(echoes: Path, output: Path, **chosen: Any) -> None:
+    """Make terrain of ECHOES, a table as decompose writes it or any LAS: what is ground, and heights on a grid.
+
+    Points that are none, alone in the air or below the ground, are marked and kept. The ground is found by a network of
+    triangles that grows from the lowest points.
+    """
+    job = importlib.import_module("openecho.batch.surface")
+    if chosen["jobs"] is not None and chosen["scheduler"] is not None:
+        raise click.UsageError("found --jobs and --scheduler, expected one of them: a cluster has its own workers")
+    given = {name: value for name, value in chosen.items() if value is not None}
+    try:
+        named = {name: given.pop(name) for name in ("angle", "distance", "spacing", "tolerance")}
+        filtering = job.Filter(cell=given.pop("building"), **named)
+    except ValueError as error:
+        raise click.UsageError(f"--{str(error).replace('cell', 'building', 1)}") from error
+    with progress("points") as advance:
+        made = job.surface_file(job.Surfacing(echoes, output, settings=filtering, **given), advance)
+    rows, columns = made.grid.shape
+    told = f"{made.points} points, {made.ground} of them ground, {made.unknown} none"
+    click.echo(f"{output}: {rows} × {columns} cells of {told}")
+
+
 @openecho.group()
 def scene() -> None:
     """Scenes that a lidar flies over, each a YAML file, and those that are bundled."""

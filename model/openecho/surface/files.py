@@ -43,6 +43,16 @@ def coordinate_system(text: str | None) -> Any:
         raise TableError(f"coordinate system: found {text!r}, expected EPSG:NUMBER or WKT") from error
 
 
+def transformed(given: Any, wanted: Any, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Coordinates (n,) of one system of rasterio in another; nan where there are none."""
+    _rasterio()
+    from rasterio.warp import transform
+
+    # PROJ gives infinity for what is nowhere.
+    east, north = (np.asarray(column, np.float64) for column in transform(given, wanted, x, y))
+    return np.where(np.isfinite(east), east, np.nan), np.where(np.isfinite(north), north, np.nan)
+
+
 def write_grid(path: Path, heights: Floats, grid: Grid, system: str | None) -> None:
     """Write heights as a GeoTIFF, float32, tiled and compressed, complete or not at all.
 

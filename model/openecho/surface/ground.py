@@ -13,9 +13,9 @@ complete, what is ground is decided anew for all points, by their distance from 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from os import sched_getaffinity
 
 import numpy as np
@@ -83,13 +83,27 @@ class Filter:
                 raise ValueError(f"{name}: found {value}, expected a number above 0 and below {most:g}")
 
 
-def ground(
-    points: ArrayLike,
-    settings: Filter | None = None,
-    *,
-    workers: int | None = None,
-    advance: Callable[[int], object] = lambda done: None,
-) -> Bools:
+@dataclass(frozen=True)
+class Tile:
+    """A part of a cloud, with what is around it.
+
+    Attributes
+    ----------
+    inner : int64 (k,)
+        Points of the tile, into the cloud.
+    places : float64 (m, 3)
+        Points of the tile and around it, m from a corner of the cloud, in which `own` (k,) are the tile's.
+    seeds : bool (m,)
+        Which of them are lowest in their cells.
+    """
+
+    inner: Ints
+    places: Floats
+    own: Ints
+    seeds: Bools
+
+
+def ground(points: ArrayLike, settings: Filter | None = None, *, workers: int | None = None) -> Bools:
     """Find the points of the ground.
 
     Parameters
@@ -99,8 +113,6 @@ def ground(
     settings : Filter, optional
     workers : int, optional
         Threads; as many as processors if left out. The result does not depend on it.
-    advance : callable, optional
-        Told how many points are done.
 
     Returns
     -------
@@ -112,31 +124,34 @@ def ground(
     ValueError
         If the points are no table of three columns.
     """
-    at = np.asarray(points, np.float64)
+    at, chosen = np.asarray(points, np.float64), settings or Filter()
     if at.ndim != 2 or at.shape[1] != 3:
         raise ValueError(f"points: found shape {at.shape}, expected (n, 3)")
-    chosen = settings or Filter()
     found = np.zeros(len(at), np.bool_)
-    known = np.flatnonzero(np.isfinite(at).all(axis=1))
-    if not len(known):
-        return found
-    # Differences are small where coordinates are large.
-    places = at[known] - np.floor(at[known].min(axis=0))
-    seeds = _seeds(places, chosen.cell)
-    tiles = list(_tiles(places[:, :2], chosen.cell * MARGIN))
-
-    def filtered(tile: tuple[Ints, Ints]) -> tuple[Ints, Bools]:
-        inner, outer = tile
-        is_ground = _grown(places[outer], seeds[outer], chosen)
-        return inner, is_ground[np.searchsorted(outer, inner)]
-
     with ThreadPoolExecutor(workers or len(sched_getaffinity(0))) as pool:
-        done = 0
-        for inner, is_ground in pool.map(filtered, tiles):
-            found[known[inner]] = is_ground
-            done += len(inner)
-            advance(done)
+        parts = tiles(at, chosen)
+        for tile, is_ground in zip(parts, pool.map(partial(filtered, settings=chosen), parts), strict=True):
+            found[tile.inner] = is_ground
     return found
+
+
+def tiles(points: Floats, settings: Filter) -> list[Tile]:
+    """Cut a cloud (n, 3) into parts that can be filtered one by one, on any machine; what is not finite is in none."""
+    known = np.flatnonzero(np.isfinite(points).all(axis=1))
+    if not len(known):
+        return []
+    # Differences are small where coordinates are large.
+    places = points[known] - np.floor(points[known].min(axis=0))
+    seeds = _seeds(places, settings.cell)
+    return [
+        Tile(known[inner], places[outer], np.searchsorted(outer, inner), seeds[outer])
+        for inner, outer in _tiles(places[:, :2], settings.cell * MARGIN)
+    ]
+
+
+def filtered(tile: Tile, settings: Filter) -> Bools:
+    """Which of a tile's own points are ground (k,)."""
+    return _grown(tile.places, tile.seeds, settings)[tile.own]
 
 
 def _tiles(places: Floats, margin: float) -> list[tuple[Ints, Ints]]:
