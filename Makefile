@@ -11,6 +11,7 @@ DATA   ?=
 SEED   ?=
 WAVES  ?=
 CLOCK  ?=
+COUNTED ?=
 STEP   ?=
 QUICK  ?=
 TRADE  ?= full
@@ -34,10 +35,10 @@ sim: $(READY) ## simulate all against their models [MODULE=] [ARITH=] [TAPS=] [S
 replay: $(READY) ## run a whole file through the core and compare every record, DATA=file [ARITH=] [TAPS=] [SIM=verilator|icarus]
 	@$(RUN) scripts/replay.py $(if $(DATA),--data '$(DATA)') $(ARITH_FLAG) $(TAPS_FLAG) $(if $(SIM),--sim '$(SIM)')
 
-test: $(READY) ## run all tests: the model's and the RTL's, on every simulator found [ARITH=fixed|float16|float32|float64]
-	@$(RUN) -m pytest -n auto $(ARITH_FLAG)
+test: $(READY) ## run all tests: the model's and the RTL's, on every simulator found [ARITH=fixed|float16|float32|float64] [COUNTED=0]
+	@$(RUN) -m pytest -n auto --dist worksteal $(ARITH_FLAG) $(if $(filter 0,$(COUNTED)),-m 'not counted')
 
-vectors: $(READY) ## stream a million vectors through every float unit, where `make test` takes 50,000
+vectors: $(READY) ## stream a million vectors through every float unit, where `make test` takes 20,000
 	@OPENECHO_FLOAT_VECTORS=1000000 $(RUN) -m pytest -n auto tb/float
 
 lint: $(READY) ## ruff, mypy, and Verilator and Verible on the RTL

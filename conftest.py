@@ -28,6 +28,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     """Refuse an arithmetic that there is not."""
     config.addinivalue_line("markers", "arithmetic(name): what the RTL under test is built for")
+    config.addinivalue_line("markers", "counted: a bench that coverage is counted with")
     chosen = config.getoption("--arith")
     if chosen not in (None, *ARITHMETICS):
         pytest.exit(f"error: ARITH: found {chosen!r}, expected one of {', '.join(ARITHMETICS)}", returncode=2)

@@ -402,7 +402,13 @@ def main() -> int:
         print(f"error: {error}", file=sys.stderr)
         return 1
     show(made, console)
-    content = {"tools": versions, "device": {"area": "xc7", "clock": "LFE5U-85F-8"}, "seeds": job.seeds, "rows": made}
+    content = {
+        "tools": versions,
+        "device": {"area": "xc7", "clock": "LFE5U-85F-8"},
+        "quick": not job.seeds or job.builds != BUILDS,
+        "seeds": job.seeds,
+        "rows": made,
+    }
     console.print(report.write("synth", content), soft_wrap=True)
     over = overruns(job.builds, made)
     for line in over:

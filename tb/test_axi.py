@@ -29,6 +29,8 @@ CASES = {
     ("axi", "icarus", "narrow"): ("tests", "counters"),
 }
 """Module, simulator and parameters, and what of tb/axi to run."""
+COUNTED = ("axi", "verilator", "narrow")
+"""What coverage is counted with."""
 STEP = 40
 """Every so many waveforms of a recorded file are sent."""
 MOST = 50
@@ -45,8 +47,8 @@ def simulate(run: Run, simulator: str, directory: Path, tests: list[str]) -> Non
 
 def marked(case: tuple[str, str, str]) -> object:
     """A case as a pytest parameter."""
-    arithmetic = case[2] if CONFIGS[case[2]].form else "fixed"
-    return pytest.param(case, id="-".join(case), marks=pytest.mark.arithmetic(arithmetic))
+    marks = [pytest.mark.arithmetic(case[2] if CONFIGS[case[2]].form else "fixed")]
+    return pytest.param(case, id="-".join(case), marks=[*marks, *[pytest.mark.counted] * (case == COUNTED)])
 
 
 @pytest.mark.parametrize("case", [marked(case) for case in CASES])

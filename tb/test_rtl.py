@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import pytest
@@ -21,6 +21,7 @@ STEEP = (25000, *range(1400, 1400 * 24, 1400))
 
 CONFIGS = {
     "default": Config(),
+    "short": Config(max_samples=1100),
     "narrow": Config(sample_w=8, frac=4, max_samples=1100, taps=(3, 11, 16, 11, 3)),
     "wide": Config(sample_w=16, frac=24, max_samples=1100, taps=STEEP + STEEP[::-1]),
     # Taps with strong edges: the second difference is wider than the first.
@@ -37,8 +38,14 @@ CONFIGS = {
 }
 """Parameters to test with. Other than the default they have a small MAX_SAMPLES, so that long waveforms cost little."""
 
-CHEAP_ON_ICARUS = ("narrow", "four taps", "float16")
-"""What Icarus, the slower simulator, runs besides the default."""
+ON_ICARUS = ("short", "narrow", "float16")
+"""What Icarus, the slower simulator, runs: the first in place of the default."""
+
+COUNTED = ("default", "float16")
+"""What coverage is counted with, on Verilator: either arithmetic."""
+
+CODEC = {"verilator": ("default", "narrow", "wide"), "icarus": ("short",)}
+"""What encoder and decoder, which know of no taps, run."""
 
 ILLEGAL = {
     "SAMPLE_W": (("7", "17"), "samples of 8 to 16 bits"),
@@ -67,13 +74,22 @@ def cases() -> Iterator[object]:
     for simulator in runner.SIMULATORS:
         for module in bench_names():
             for name, config in CONFIGS.items():
-                if simulator == "icarus" and name not in ("default", *CHEAP_ON_ICARUS):
+                if name not in _worth_it(module, simulator):
                     continue
                 if config.form is not None and "EXP_W" not in MODULES[module].parameters:
                     continue  # the same in either arithmetic
-                mark = pytest.mark.arithmetic("fixed" if config.form is None else name)
+                marks = [pytest.mark.arithmetic("fixed" if config.form is None else name)]
+                if simulator == "verilator" and name in COUNTED:
+                    marks.append(pytest.mark.counted)
                 case = f"{module}-{simulator}-{name.replace(' ', '_')}"
-                yield pytest.param(module, simulator, name, id=case, marks=mark)
+                yield pytest.param(module, simulator, name, id=case, marks=marks)
+
+
+def _worth_it(module: str, simulator: str) -> Collection[str]:
+    """Sets of parameters that a module is run with on a simulator."""
+    if module in ("encoder", "decoder"):
+        return CODEC[simulator]
+    return ON_ICARUS if simulator == "icarus" else CONFIGS.keys() - {"short"}
 
 
 def benches(module: str, config: Config) -> list[str]:

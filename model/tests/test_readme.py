@@ -30,6 +30,6 @@ def test_every_part_has_its_markers_in_the_readme() -> None:
 def test_parts_of_long_studies_stay_without_a_full_report(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(report, "FOLDER", tmp_path)
     assert readme.with_long_studies("whatever") == "whatever"
-    for name in ("trade", "extremes"):
+    for name in ("trade", "extremes", "synth", "bench"):
         report.write(name, {"quick": True})
     assert readme.with_long_studies("whatever") == "whatever"

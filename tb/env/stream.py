@@ -81,16 +81,15 @@ class Observed:
 
 
 class StreamDriver(ValidatedBusDriver):
-    """Drives `valid` and the payload; `valid_generator` makes gaps."""
+    """Drives `valid` and the payload; `valid_generator` makes gaps. The stream's monitor tells it what was taken."""
 
-    def __init__(self, dut: Any, stream: Stream, clock: Any) -> None:
+    def __init__(self, dut: Any, stream: Stream, clock: Any, monitor: StreamMonitor) -> None:
         self._signals = ["valid", "ready", *ports(stream)]
         super().__init__(dut, stream.prefix, clock, case_insensitive=False)
         payload = [getattr(self.bus, port) for port in ports(stream)]
         self._ports = list(zip(ports(stream), map(pins.width, payload), strict=True))
         self._writers = [pins.writer(handle) for handle in payload]
-        self._valid, self._ready = pins.writer(self.bus.valid), pins.reader(self.bus.ready)
-        self._rising, self._falling = RisingEdge(clock), FallingEdge(clock)
+        self._valid, self._monitor, self._falling = pins.writer(self.bus.valid), monitor, FallingEdge(clock)
         # What stands on the payload while `valid` is low: a module that looks at it then ends a waveform.
         self._rubbish = [pins.encode(np.array([-1]), bits)[0] for _, bits in self._ports]
         self.aborted = False
@@ -104,7 +103,7 @@ class StreamDriver(ValidatedBusDriver):
 
     async def _driver_send(self, transaction: Beats, sync: bool = True) -> None:
         """Offer each beat until it is taken. Begins and ends on a falling edge, so that no gap is between waveforms."""
-        valid, ready, rising, falling = self._valid, self._ready, self._rising, self._falling
+        valid, monitor, falling = self._valid, self._monitor, self._falling
         columns = [pins.encode(transaction[port], bits) for port, bits in self._ports]
         old: tuple[pins.Pin | None, ...] = (None,) * len(columns)
         if sync:
@@ -125,10 +124,9 @@ class StreamDriver(ValidatedBusDriver):
                     write(value)
             old = beat
             valid(1)
-            await rising
-            while ready() != "1" and not self.aborted:
-                await rising
             await falling
+            while not (monitor.taken or self.aborted):
+                await falling
         self.clear_pins()
 
 
@@ -143,6 +141,8 @@ class StreamMonitor(BusMonitor):
         self.stream = stream
         self.cycle = 0
         self.transfers = 0
+        self.taken = False
+        """Whether the last rising edge took a beat."""
         self.violations: list[str] = []
         self._resetting = True  # nothing is known of a module that was never reset
         self._current = Observed()
@@ -166,6 +166,7 @@ class StreamMonitor(BusMonitor):
         while True:
             await rising
             self.cycle += 1
+            self.taken = False
             offers = valid()
             if self._resetting:
                 reset_cycles += 1
@@ -182,6 +183,7 @@ class StreamMonitor(BusMonitor):
                 if ready() == "1":
                     offered = None
                     self.transfers += 1
+                    self.taken = True
                     current.beats.append(beat)
                     current.cycles.append(self.cycle)
                     if beat[0] == "1" or not ends_by_last:
@@ -221,9 +223,9 @@ class Monitor(uvm_monitor):
 class Driver(uvm_driver):
     """Hands waveforms from the sequencer to the pins."""
 
-    def __init__(self, name: str, parent: Any, dut: Any, stream: Stream) -> None:
+    def __init__(self, name: str, parent: Any, dut: Any, stream: Stream, monitor: StreamMonitor) -> None:
         super().__init__(name, parent)
-        self.bus = StreamDriver(dut, stream, dut.clk)
+        self.bus = StreamDriver(dut, stream, dut.clk, monitor)
         self.sent = 0
 
     async def run_phase(self) -> None:
@@ -249,8 +251,8 @@ class SourceAgent(uvm_agent):
         """Create the parts."""
         super().build_phase()
         self.sequencer = uvm_sequencer("sequencer", self)
-        self.driver = Driver("driver", self, self.dut, self.stream)
         self.monitor = Monitor("monitor", self, self.dut, self.stream)
+        self.driver = Driver("driver", self, self.dut, self.stream, self.monitor.bus)
 
     def connect_phase(self) -> None:
         """Join sequencer and driver."""

@@ -1,6 +1,6 @@
 """Every float unit in every format, bit for bit, with its flags, its latency and its throughput.
 
-OPENECHO_FLOAT_VECTORS sets how many vectors a unit gets on Verilator: 50,000, or a million in the nightly run.
+OPENECHO_FLOAT_VECTORS sets how many vectors a unit gets on Verilator: 20,000, or a million in the nightly run.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from tb.env.runner import find_simulators
 from tb.float import bench, vectors
 from tb.float.lanes import FORMATS, LANES, SMALL, Lane, stimulus
 
-COUNT = {"verilator": int(os.environ.get("OPENECHO_FLOAT_VECTORS", "50000")), "icarus": 10_000}
+COUNT = {"verilator": int(os.environ.get("OPENECHO_FLOAT_VECTORS", "20000")), "icarus": 5_000}
 FASTEST = find_simulators()[:1]
 EXHAUSTIVE = 1 << 19  # as many as from_int has integers; the small format has 65,536 pairs
 NAMES = [pytest.param(name, marks=pytest.mark.arithmetic(lane.arithmetic)) for name, lane in LANES.items()]

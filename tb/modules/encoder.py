@@ -175,9 +175,9 @@ def is_long_affordable() -> bool:
 
 @pyuvm.test(skip=not is_long_affordable())
 class TooManySamplesSpoilNoOtherRecord(ModuleTest):
-    """65535 samples are counted; of one more, or twice as many, bit 16 of the count stays; the next record is sound."""
+    """65535 samples are counted; of one more bit 16 of the count is set; the next record is sound."""
 
     async def scenario(self) -> None:
         """Play long waveforms of small samples, with a short one behind each."""
-        lengths = (MOST_SAMPLES, 22, MOST_SAMPLES + 1, 22, 2 * MOST_SAMPLES + 5, 22)
+        lengths = (MOST_SAMPLES, 22, MOST_SAMPLES + 1, 22)
         await self.play("long", [self.rng.integers(0, 3, length) for length in lengths])

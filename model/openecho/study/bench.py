@@ -598,6 +598,7 @@ def main() -> None:
     content = {
         "tools": report.tools("numpy", "scipy", "numba", "gdecomp"),
         "seed": options.seed,
+        "quick": options.quick,
         "waveforms": count,
         "noise": NOISE,
         "baseline": BASELINE,
