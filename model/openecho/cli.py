@@ -6,6 +6,7 @@ import importlib
 import json
 import signal
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -380,7 +381,7 @@ def compress(files: tuple[Path, ...], output: Path | None, mode: str, bits: int 
     """
     results = _compressed_names(files, output)
     for file, made in zip(files, results, strict=True):
-        job = batch.Compression(file, made, _codec().MODES.index(mode), bits, verify)
+        job = batch.Compression(file, made, _optional("openecho.codec").MODES.index(mode), bits, verify)
         start = time.perf_counter()
         try:
             with progress("waveforms") as advance:
@@ -415,7 +416,7 @@ def decompress(file: Path, output: Path | None) -> None:
     if made.suffix.lower() != ".npz":
         raise click.UsageError(f"{made}: found the suffix {made.suffix or 'none'}, expected .npz")
     _not_itself(file, made)
-    _codec()
+    _optional("openecho.codec")
     with progress("waveforms") as advance:
         waveforms, left_out = batch.decompress_file(file, made, advance)
     for name in left_out:
@@ -457,7 +458,7 @@ def surface(echoes: Path, output: Path, **chosen: Any) -> None:
     Points that are none, alone in the air or below the ground, are marked and kept. The ground is found by a network of
     triangles that grows from the lowest points.
     """
-    job = importlib.import_module("openecho.batch.surface")
+    job = _optional("openecho.batch.surface")
     if chosen["jobs"] is not None and chosen["scheduler"] is not None:
         raise click.UsageError("found --jobs and --scheduler, expected one of them: a cluster has its own workers")
     given = {name: value for name, value in chosen.items() if value is not None}
@@ -473,6 +474,30 @@ def surface(echoes: Path, output: Path, **chosen: Any) -> None:
     click.echo(f"{output}: {rows} × {columns} cells of {told}")
 
 
+@openecho.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    callback=in_folder,
+    help="Page to write, .html.  [default: a browser's window]",
+)
+@_a_file("Heights that it should have, .tif, to colour it by what it is off.", "--truth")
+@click.option("--most", type=click.IntRange(4), help="Points or heights to draw at most.  [default: 200000]")
+def view(file: Path, output: Path | None, truth: Path | None, most: int | None) -> None:
+    """Show FILE in space, as a page of its own to turn and zoom: echoes with places, points, a grid or triangles.
+
+    .csv, .npz, .parquet, .las, .laz; .tif; .ply. Coloured by class, height, intensity, or error.
+    """
+    shown = _optional("openecho.study.surface_view")
+    page = Path(tempfile.mkdtemp(prefix="openecho-")) / f"{file.stem}.html" if output is None else output
+    told = shown.write(file, page, truth=truth, most=shown.MOST if most is None else most)
+    click.echo(f"{page}: {told}")
+    if output is None:
+        click.launch(str(page))
+
+
 @openecho.group()
 def scene() -> None:
     """Scenes that a lidar flies over, each a YAML file, and those that are bundled."""
@@ -481,7 +506,7 @@ def scene() -> None:
 @scene.command("list")
 def list_scenes() -> None:
     """Name the bundled scenes, which are taken by name wherever a file is."""
-    for name, description in _scenes().bundled().items():
+    for name, description in _optional("openecho.scene.schema").bundled().items():
         click.echo(f"{name:12}{description}")
 
 
@@ -509,7 +534,7 @@ def plan_scene(scene: Any, fidelity: str, rays: int | None) -> None:
     more than the scene's tolerance.
     """
     with _naming(scene):
-        planning = _scenes("openecho.study.planning")
+        planning = _optional("openecho.study.planning")
         found = planning.compare(scene.scene, fidelity, rays)
     console = Console(highlight=False)
     for part in planning.tables(found):
@@ -523,7 +548,7 @@ def plan_scene(scene: Any, fidelity: str, rays: int | None) -> None:
 def view_scene(scene: Any, output: Path | None, waveforms: int) -> None:
     """Draw SCENE: heights with the beams on them, one scan from the side, and a few waveforms with their truth."""
     with _naming(scene):
-        drawn = _scenes("openecho.study.scene_view").draw(scene.scene, waveforms)
+        drawn = _optional("openecho.study.scene_view").draw(scene.scene, waveforms)
     if output is None:
         figure.show(drawn)
     else:
@@ -563,8 +588,8 @@ def simulate(
         raise click.UsageError("found --jobs and --scheduler, expected one of them: a cluster has its own workers")
     chosen = {name: value for name, value in (("shots", shots), ("seed", seed)) if value is not None}
     with _naming(scene):
-        world = _scenes().changed(scene.scene, **chosen)
-    simulation = _scenes("openecho.batch.simulate")
+        world = _optional("openecho.scene.schema").changed(scene.scene, **chosen)
+    simulation = _optional("openecho.batch.simulate")
     job = simulation.Simulation(world, output, fidelity, rays, noiseless, jobs or 1, scheduler)
     try:
         with _naming(scene), progress("waveforms") as advance:
@@ -581,7 +606,7 @@ def simulate(
 @click.option("--json", "as_json", is_flag=True, help="As JSON Schema, for editors.")
 def scene_schema(as_json: bool) -> None:
     """Say what a scene is made of: every key, its unit, what is assumed where it is left out, and what it means."""
-    scenes = _scenes()
+    scenes = _optional("openecho.scene.schema")
     click.echo(json.dumps(scenes.json_schema(), indent=2) if as_json else scenes.described())
 
 
@@ -611,16 +636,8 @@ def _not_itself(file: Path, made: Path) -> None:
         raise click.UsageError(f"{made}: found the same file for input and output, expected another")
 
 
-def _codec() -> Any:
-    """The codec, which needs a compiler."""
-    try:
-        return importlib.import_module("openecho.codec")
-    except ModuleNotFoundError as error:
-        raise click.UsageError(str(error)) from error
-
-
-def _scenes(module: str = "openecho.scene.schema") -> Any:
-    """What reads and simulates scenes, which needs packages that nothing else does."""
+def _optional(module: str) -> Any:
+    """A module of this package that needs packages which nothing else does."""
     try:
         return importlib.import_module(module)
     except ModuleNotFoundError as error:
@@ -636,7 +653,7 @@ class _Named:
 
 
 def _scene(name: str) -> _Named:
-    schema = _scenes()
+    schema = _optional("openecho.scene.schema")
     try:
         return _Named(name, schema.load(name))
     except schema.SceneError as error:
@@ -648,7 +665,7 @@ def _naming(scene: _Named) -> Iterator[None]:
     """Name the scene in an error of what it needs."""
     try:
         yield
-    except _scenes().SceneError as error:
+    except _optional("openecho.scene.schema").SceneError as error:
         raise click.UsageError(f"{scene.name}: {error}") from error
     except ModuleNotFoundError as error:
         raise click.UsageError(str(error)) from error

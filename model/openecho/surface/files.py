@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,9 @@ NOWHERE = -9999.0
 
 LOCAL = 'LOCAL_CS["metres of a scene",UNIT["metre",1],AXIS["x",EAST],AXIS["y",NORTH]]'
 """Coordinate system of what tells none: a map's axes, from a place that nobody knows."""
+
+OFFSET = "comment offset"
+"""Before x, y and z of what a mesh's coordinates count from: single, they are too short for those of a map."""
 
 STEP = 1e-3
 """Of LAS coordinates, m."""
@@ -94,10 +98,46 @@ def write_grid(path: Path, heights: Floats, grid: Grid, system: str | None) -> N
     _whole(path, write)
 
 
+def read_grid(path: Path) -> tuple[Floats, Grid, str | None]:
+    """Read heights from a GeoTIFF.
+
+    Parameters
+    ----------
+    path : Path
+        North up, its cells squares, heights in the first band.
+
+    Returns
+    -------
+    heights : float64 (rows, columns)
+        nan where there are none.
+    grid : Grid
+    wkt : str or None
+        Coordinate system, if it tells one.
+
+    Raises
+    ------
+    TableError
+        If it is none: what was found and what was expected.
+    OSError
+        If it can't be read.
+    """
+    rasterio = _rasterio()
+    try:
+        with path.open("rb") as file, rasterio.open(file) as image:
+            band = image.read(1, masked=True).astype(np.float64)
+            east, tilt, west, lean, north, top = image.transform[:6]
+            system = image.crs
+    except rasterio.errors.RasterioError as error:
+        raise TableError(f"{path}: {str(error).splitlines()[0]}, expected a GeoTIFF") from error
+    if tilt or lean or east <= 0 or not np.isclose(east, -north):
+        raise TableError(f"{path}: found cells of {east:g} × {north:g}, expected squares, north up")
+    return band.filled(np.nan), Grid(west, top, east, band.shape), None if system is None else system.to_wkt()
+
+
 def write_mesh(path: Path, ground: Floats) -> None:
     """Write triangulated points (n, 3) as PLY, complete or not at all.
 
-    Its coordinates are single, too short for those of a map: they count from a corner that a comment tells.
+    Its coordinates count from a corner that a comment tells, `OFFSET`.
 
     Raises
     ------
@@ -116,8 +156,32 @@ def write_mesh(path: Path, ground: Floats) -> None:
     corner = np.floor(points.min(axis=0))
     content = trimesh.exchange.ply.export_ply(trimesh.Trimesh(points - corner, faces, process=False))
     head, rest = content.split(b"\nelement", 1)
-    told = f"\ncomment offset {corner[0]:.0f} {corner[1]:.0f} {corner[2]:.0f}".encode()
+    told = f"\n{OFFSET} {corner[0]:.0f} {corner[1]:.0f} {corner[2]:.0f}".encode()
     _whole(path, lambda partial: partial.write_bytes(head + told + b"\nelement" + rest))
+
+
+def read_mesh(path: Path) -> tuple[Floats, NDArray[np.int64]]:
+    """Read triangles from PLY: corners (n, 3), m, and which three each has (k, 3).
+
+    Raises
+    ------
+    TableError
+        If it is none.
+    OSError
+        If it can't be read.
+    """
+    import trimesh  # optional
+
+    content = path.read_bytes()
+    try:
+        loaded = trimesh.load_mesh(io.BytesIO(content), file_type="ply", process=False)
+        corners, faces = np.array(loaded.vertices, np.float64), np.array(loaded.faces, np.int64)
+        head = content.partition(b"end_header")[0].decode().splitlines()
+        corner = [line.removeprefix(OFFSET).split() for line in head if line.startswith(OFFSET)]
+        corners += np.array(corner[0] if corner else (0, 0, 0), np.float64)
+    except (ValueError, IndexError, KeyError, AttributeError, TypeError) as error:
+        raise TableError(f"{path}: {error}, expected triangles as PLY") from error
+    return corners, faces
 
 
 def write_points(path: Path, cloud: Cloud) -> None:

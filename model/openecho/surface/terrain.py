@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.colors import LightSource
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import LinearNDInterpolator
-from scipy.ndimage import distance_transform_edt, gaussian_filter
+from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinates
 from scipy.spatial import Delaunay, QhullError
 
 Floats = NDArray[np.float64]
@@ -143,6 +143,14 @@ def surface(points: ArrayLike, grid: Grid, *, reach: float = math.inf) -> Floats
     if np.isfinite(reach):
         heights[_away(at, grid) > reach] = np.nan
     return heights
+
+
+def heights_at(heights: Floats, grid: Grid, points: ArrayLike) -> Floats:
+    """Heights (n,) of a grid at points (n, 2 or 3), linear between the centres of its cells; nan beyond those."""
+    at = np.asarray(points, np.float64)
+    column = (at[:, 0] - grid.west) / grid.cell - 0.5
+    row = (grid.north - at[:, 1]) / grid.cell - 0.5
+    return np.asarray(map_coordinates(heights, [row, column], order=1, cval=np.nan, prefilter=False))
 
 
 def hillshade(heights: Floats, cell: float) -> Floats:
