@@ -24,7 +24,7 @@ TAPS_FLAG  := $(if $(TAPS),--taps='$(TAPS)')
 SIM_FLAGS  := $(if $(MODULE),--module '$(MODULE)') $(ARITH_FLAG) $(TAPS_FLAG) $(if $(SIM),--sim '$(SIM)') \
               $(if $(DATA),--data '$(DATA)') $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(WAVES)),--waves)
 
-.PHONY: help sim replay test vectors lint format mutate formal synth vivado coverage precision score figures bench scenes compression trade extremes scale registers readme clean
+.PHONY: help sim replay test vectors lint format mutate formal synth vivado coverage precision score figures bench scenes compression trade terrain extremes scale registers readme clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-11s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -84,6 +84,9 @@ compression: $(READY) ## bits a sample and speed of the lossless codec beside zl
 trade: $(if $(filter quick,$(TRADE)),$(READY),$(VENV)/.synth) ## what speed costs: every way to decompose, its accuracy, area and speed; 20 minutes [TRADE=quick] [SEED=]
 	@$(RUN) scripts/ways.py --extent '$(TRADE)'
 	@$(RUN) -m openecho.study.trade --extent '$(TRADE)' $(if $(SEED),--seed '$(SEED)')
+
+terrain: $(VENV)/.bench ## from waveforms to terrain with its truth: methods, ground filters, cost of a million points; 20 minutes [QUICK=1] [SEED=]
+	@$(RUN) -m openecho.study.terrain $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(QUICK)),--quick)
 
 extremes: $(READY) ## numerical stability at the extremes: what is tried, guaranteed and found, each guarantee broken once [SEED=] [QUICK=1]
 	@$(RUN) -m openecho.study.extremes $(if $(SEED),--seed '$(SEED)') $(if $(filter-out 0,$(QUICK)),--quick)

@@ -429,6 +429,11 @@ def _a_file(meaning: str, *names: str) -> Callable[[Callable[..., None]], Callab
     return click.option(*names, type=click.Path(path_type=Path), callback=in_folder, help=meaning)
 
 
+def _of_filter(meaning: str, usual: float, name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Option of a setting of the ground filter."""
+    return click.option(name, type=float, help=f"{meaning}  [default: {usual:g}; more where points are sparse]")
+
+
 @openecho.command()
 @click.argument("echoes", type=click.Path(path_type=Path))
 @click.option(
@@ -442,11 +447,11 @@ def _a_file(meaning: str, *names: str) -> Callable[[Callable[..., None]], Callab
 @click.option("--cell", type=float, default=1.0, show_default=True, help="Side of a grid's squares, m.")
 @click.option("--smoothing", type=click.FloatRange(0), default=0.0, show_default=True, help="σ over the heights, m.")
 @click.option("--reach", type=click.FloatRange(0, min_open=True), help="How far from points heights go, m.")
-@click.option("--building", type=float, default=25.0, show_default=True, help="Longer than any building, m.")
-@click.option("--angle", type=float, default=8.0, show_default=True, help="Under which ground is seen, degrees.")
-@click.option("--distance", type=float, default=1.4, show_default=True, help="Of new ground from what is known, m.")
-@click.option("--spacing", type=float, default=1.5, show_default=True, help="Of the corners of the network, m.")
-@click.option("--tolerance", type=float, default=0.3, show_default=True, help="Of ground about the network, m.")
+@_of_filter("Longer than any building, m.", 25, "--building")
+@_of_filter("Under which ground is seen, degrees.", 8, "--angle")
+@_of_filter("Of new ground from what is known, m.", 1.4, "--distance")
+@_of_filter("Of the corners of the network, m.", 1.5, "--spacing")
+@_of_filter("Of ground about the network, m.", 0.3, "--tolerance")
 @click.option("--lowest", type=float, help="Height that is believed, m.")
 @click.option("--highest", type=float, help="Height that is believed, m.")
 @click.option("--system", metavar="EPSG:NUMBER", help="Coordinate system, or what to project degrees into.")
@@ -462,13 +467,14 @@ def surface(echoes: Path, output: Path, **chosen: Any) -> None:
     if chosen["jobs"] is not None and chosen["scheduler"] is not None:
         raise click.UsageError("found --jobs and --scheduler, expected one of them: a cluster has its own workers")
     given = {name: value for name, value in chosen.items() if value is not None}
+    names = {"building": "cell", **{name: name for name in ("angle", "distance", "spacing", "tolerance")}}
+    settings = {own: given.pop(name) for name, own in names.items() if name in given}
     try:
-        named = {name: given.pop(name) for name in ("angle", "distance", "spacing", "tolerance")}
-        filtering = job.Filter(cell=given.pop("building"), **named)
+        _optional("openecho.surface.ground").Filter(**settings)
     except ValueError as error:
         raise click.UsageError(f"--{str(error).replace('cell', 'building', 1)}") from error
     with progress("points") as advance:
-        made = job.surface_file(job.Surfacing(echoes, output, settings=filtering, **given), advance)
+        made = job.surface_file(job.Surfacing(echoes, output, settings=settings, **given), advance)
     rows, columns = made.grid.shape
     told = f"{made.points} points, {made.ground} of them ground, {made.unknown} none"
     click.echo(f"{output}: {rows} × {columns} cells of {told}")

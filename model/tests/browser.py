@@ -16,6 +16,13 @@ LOCAL = ("file:", "data:")
 """Where a page may take things from."""
 
 
+GRAPHICS = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+"""What draws in space without a graphics card."""
+
+HINTS = ("Canvas2D: Multiple readback operations",)
+"""Warnings of how a page could be faster."""
+
+
 @dataclass(frozen=True)
 class Visit:
     """A page that is open.
@@ -53,7 +60,7 @@ def opened(path: Path, width: int = 1200, height: int = 900) -> Iterator[Visit]:
     complaints: list[str] = []
 
     def console(message: ConsoleMessage) -> None:
-        if message.type in ("error", "warning"):
+        if message.type in ("error", "warning") and not message.text.startswith(HINTS):
             complaints.append(f"console: {message.type}: {message.text}")
 
     def request(asked: Request) -> None:
@@ -63,7 +70,7 @@ def opened(path: Path, width: int = 1200, height: int = 900) -> Iterator[Visit]:
     executable = chromium()
     with sync_playwright() as playwright:
         # A container has neither the namespaces of the sandbox nor a graphics card.
-        browser = playwright.chromium.launch(executable_path=executable, args=["--no-sandbox", "--disable-gpu"])
+        browser = playwright.chromium.launch(executable_path=executable, args=["--no-sandbox", *GRAPHICS])
         try:
             page = browser.new_context(offline=True, viewport={"width": width, "height": height}).new_page()
             page.on("console", console)

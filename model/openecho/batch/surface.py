@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -11,8 +12,8 @@ from numpy.typing import NDArray
 from openecho.batch.decompose import Advance
 from openecho.batch.distribute import run
 from openecho.surface import files, terrain
-from openecho.surface.ground import Filter, Tile, filtered, tiles
-from openecho.surface.points import GROUND, UNCLASSIFIED, Cloud, read
+from openecho.surface.ground import Tile, filtered, suited, tiles
+from openecho.surface.points import GROUND, HIGH, LOW, UNCLASSIFIED, Cloud, read
 from openecho.surface.unknown import unknown
 from openecho.tables.table import TableError
 
@@ -39,8 +40,8 @@ class Surfacing:
         Side of a grid's squares, m.
     smoothing, reach : float
         As of `openecho.surface.terrain.elevation`, m.
-    settings : Filter
-        Of the ground filter.
+    settings : mapping
+        Fields of `openecho.surface.ground.Filter` that are not to be as `openecho.surface.ground.suited` has them.
     lowest, highest : float
         Heights that are believed, m.
     system : str or None
@@ -62,7 +63,7 @@ class Surfacing:
     cell: float = 1.0
     smoothing: float = 0.0
     reach: float = np.inf
-    settings: Filter = field(default_factory=Filter)
+    settings: Mapping[str, float] = field(default_factory=dict)
     lowest: float = -np.inf
     highest: float = np.inf
     system: str | None = None
@@ -112,11 +113,13 @@ def surface_file(job: Surfacing, advance: Advance = lambda doing, done, total: N
     except ValueError as error:
         raise TableError(f"{job.source}: {error}") from error
     none = unknown(places, lowest=job.lowest, highest=job.highest)
-    is_ground = _ground(np.where((none > 0)[:, None], np.nan, places), job, advance)
-    cloud.points["class"] = np.where(none > 0, none, np.where(is_ground, GROUND, UNCLASSIFIED))
+    classes = _classes(np.where((none > 0)[:, None], np.nan, places), job, advance)
+    classes = np.where(none > 0, none, classes)
+    cloud.points["class"] = classes
     advance("writing", 0, None)
     _write(job, cloud, grid)
-    return Surfaced(len(places), int((none > 0).sum()), int(is_ground.sum()), grid)
+    is_none = (classes == LOW) | (classes == HIGH)
+    return Surfaced(len(places), int(is_none.sum()), int((classes == GROUND).sum()), grid)
 
 
 def _check(job: Surfacing) -> None:
@@ -150,15 +153,16 @@ def _projected(cloud: Cloud, job: Surfacing) -> Cloud:
     return Cloud(points, wanted.to_wkt())
 
 
-def _ground(places: NDArray[np.float64], job: Surfacing, advance: Advance) -> NDArray[np.bool_]:
-    """Which points are ground, tile by tile."""
-    parts: list[Tile] = tiles(places, job.settings)
-    found, done = np.zeros(len(places), np.bool_), 0
+def _classes(places: NDArray[np.float64], job: Surfacing, advance: Advance) -> NDArray[np.uint8]:
+    """Classes of points, tile by tile."""
+    settings = replace(suited(places), **job.settings)
+    parts: list[Tile] = tiles(places, settings)
+    found, done = np.full(len(places), UNCLASSIFIED, np.uint8), 0
     advance("filtering", done, len(places))
-    calls = ((number, (tile, job.settings)) for number, tile in enumerate(parts))
-    for number, is_ground in run(filtered, calls, job.jobs, job.scheduler):
-        found[parts[number].inner] = is_ground
-        done += len(is_ground)
+    calls = ((number, (tile, settings)) for number, tile in enumerate(parts))
+    for number, classes in run(filtered, calls, job.jobs, job.scheduler):
+        found[parts[number].inner] = classes
+        done += len(classes)
         advance("filtering", done, len(places))
     return found
 

@@ -199,15 +199,29 @@ def _scaled(values: Floats, scale: str, title: str, *, around: bool = False) -> 
     if around:
         high = max(abs(low), abs(high)) or 1.0
         low = -high
-    look = {"cmin": float(low), "cmax": float(high), "colorscale": scale, "colorbar": {"title": {"text": title}}}
+    look = {
+        "cmin": float(low),
+        "cmax": float(high),
+        "colorscale": scale,
+        "colorbar": {"title": {"text": title}, "tickvals": None, "ticktext": None},
+    }
     return {"color": values.astype(np.float32), **look}
 
 
 def _classes(classes: NDArray[np.uint8]) -> dict[str, Any]:
-    """Colours of the classes; any other is as what is above the ground."""
-    order = list(COLOURS)
-    place = np.array([order.index(int(kind)) if kind in COLOURS else 0 for kind in classes], np.float32)
+    """Colours of the classes that there are; any other is as what is above the ground."""
+    kinds = np.where(np.isin(classes, list(COLOURS)), classes, UNCLASSIFIED)
+    order = [kind for kind in COLOURS if kind in kinds]
     edges = np.repeat(np.arange(len(order) + 1) / len(order), 2)[1:-1]
-    scale = [[float(edge), colour] for edge, colour in zip(edges, np.repeat(list(COLOURS.values()), 2), strict=True)]
-    bar = {"tickvals": list(range(len(order))), "ticktext": [CLASSES[kind] for kind in order], "title": {"text": ""}}
-    return {"color": place, "cmin": -0.5, "cmax": len(order) - 0.5, "colorscale": scale, "colorbar": bar}
+    colours = [COLOURS[kind] for kind in order for _ in range(2)]
+    return {
+        "color": np.argmax(kinds[:, None] == order, axis=1).astype(np.float32),
+        "cmin": -0.5,
+        "cmax": len(order) - 0.5,
+        "colorscale": [[float(edge), colour] for edge, colour in zip(edges, colours, strict=True)],
+        "colorbar": {
+            "tickvals": list(range(len(order))),
+            "ticktext": [CLASSES[kind] for kind in order],
+            "title": {"text": ""},
+        },
+    }

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import Delaunay, cKDTree
 
 from openecho.compiled import njit
+from openecho.surface.points import GROUND, LOW, NEIGHBOURS, UNCLASSIFIED, spacing
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -34,8 +35,14 @@ PASSES = 4
 ENOUGH = 0.01
 """Share of the corners that a pass has to add for another to be worth it."""
 
-OUTLIERS, GAP = 4, 1.0
-"""Points at the bottom of a cell that may all be none: how many, and how far, m, the next is above them."""
+ABYSS = 45.0
+"""Angle under which a point that is none sees all its neighbours above it, or all below, degrees."""
+
+HEIGHT_NOISE = 0.5
+"""m, by which neighbours differ at no distance at all."""
+
+STEEPEST = 45.0
+"""Angle that is allowed where points are sparse, degrees."""
 
 TILE = 200_000
 """Points of a tile, about."""
@@ -83,6 +90,21 @@ class Filter:
                 raise ValueError(f"{name}: found {value}, expected a number above 0 and below {most:g}")
 
 
+def suited(points: Floats) -> Filter:
+    """Settings for points (n, 3): those of `Filter` up to a metre or two between them, and wider for sparser ones.
+
+    Between points that are far apart the ground itself rises as much as what stands on it.
+    """
+    apart, usual = spacing(points[np.isfinite(points).all(axis=1)]), Filter()
+    return Filter(
+        cell=max(usual.cell, 4 * apart),
+        angle=min(max(usual.angle, math.degrees(math.atan(apart / 10))), STEEPEST),
+        distance=max(usual.distance, 0.8 * apart),
+        spacing=max(usual.spacing, apart / 2),
+        tolerance=max(usual.tolerance, apart / 10),
+    )
+
+
 @dataclass(frozen=True)
 class Tile:
     """A part of a cloud, with what is around it.
@@ -93,13 +115,14 @@ class Tile:
         Points of the tile, into the cloud.
     places : float64 (m, 3)
         Points of the tile and around it, m from a corner of the cloud, in which `own` (k,) are the tile's.
-    seeds : bool (m,)
-        Which of them are lowest in their cells.
+    able, seeds : bool (m,)
+        Which of them may be corners of the network, and which are to begin with.
     """
 
     inner: Ints
     places: Floats
     own: Ints
+    able: Bools
     seeds: Bools
 
 
@@ -111,6 +134,7 @@ def ground(points: ArrayLike, settings: Filter | None = None, *, workers: int | 
     points : array_like (n, 3)
         m, of any kind: single echoes, last ones, all.
     settings : Filter, optional
+        Those of `suited` if left out.
     workers : int, optional
         Threads; as many as processors if left out. The result does not depend on it.
 
@@ -124,14 +148,15 @@ def ground(points: ArrayLike, settings: Filter | None = None, *, workers: int | 
     ValueError
         If the points are no table of three columns.
     """
-    at, chosen = np.asarray(points, np.float64), settings or Filter()
+    at = np.asarray(points, np.float64)
     if at.ndim != 2 or at.shape[1] != 3:
         raise ValueError(f"points: found shape {at.shape}, expected (n, 3)")
+    chosen = settings or suited(at)
     found = np.zeros(len(at), np.bool_)
     with ThreadPoolExecutor(workers or len(sched_getaffinity(0))) as pool:
         parts = tiles(at, chosen)
-        for tile, is_ground in zip(parts, pool.map(partial(filtered, settings=chosen), parts), strict=True):
-            found[tile.inner] = is_ground
+        for tile, classes in zip(parts, pool.map(partial(filtered, settings=chosen), parts), strict=True):
+            found[tile.inner] = classes == GROUND
     return found
 
 
@@ -142,16 +167,17 @@ def tiles(points: Floats, settings: Filter) -> list[Tile]:
         return []
     # Differences are small where coordinates are large.
     places = points[known] - np.floor(points[known].min(axis=0))
-    seeds = _seeds(places, settings.cell)
+    able = _has_company(places)
+    seeds = _seeds(places, able, settings.cell)
     return [
-        Tile(known[inner], places[outer], np.searchsorted(outer, inner), seeds[outer])
+        Tile(known[inner], places[outer], np.searchsorted(outer, inner), able[outer], seeds[outer])
         for inner, outer in _tiles(places[:, :2], settings.cell * MARGIN)
     ]
 
 
-def filtered(tile: Tile, settings: Filter) -> Bools:
-    """Which of a tile's own points are ground (k,)."""
-    return _grown(tile.places, tile.seeds, settings)[tile.own]
+def filtered(tile: Tile, settings: Filter) -> NDArray[np.uint8]:
+    """Classes of a tile's own points (k,): `GROUND`, `LOW` for what is far below it, `UNCLASSIFIED`."""
+    return _grown(tile, settings)[tile.own]
 
 
 def _tiles(places: Floats, margin: float) -> list[tuple[Ints, Ints]]:
@@ -173,48 +199,48 @@ def _tiles(places: Floats, margin: float) -> list[tuple[Ints, Ints]]:
     return made
 
 
-def _seeds(places: Floats, cell: float) -> Bools:
-    """Lowest point of each cell, but for a few far below the rest of it."""
-    column, row = np.floor(places[:, :2] / cell).astype(np.int64).T
-    key = column * (int(row.max()) + 1) + row
-    order = np.lexsort((places[:, 1], places[:, 0], places[:, 2], key))  # the same point, whatever their order
-    starts = np.flatnonzero(np.diff(key[order], prepend=-1))
-    size = np.diff(starts, append=len(order))
-    heights = places[order, 2]
-    lowest = starts.copy()
-    for number in range(1, OUTLIERS + 1):
-        deep = size > 2 * OUTLIERS
-        gap = np.zeros(len(starts))
-        gap[deep] = heights[starts[deep] + number] - heights[starts[deep] + number - 1]
-        lowest = np.where(gap > GAP, starts + number, lowest)
+def _has_company(places: Floats) -> Bools:
+    """Which points see one of their neighbours in plan under a small angle: pits and spikes of one point do not."""
+    count = min(NEIGHBOURS, len(places) - 1)
+    if count < NEIGHBOURS:
+        return np.ones(len(places), np.bool_)
+    away, neighbours = cKDTree(places[:, :2]).query(places[:, :2], count + 1, workers=-1)
+    rise = abs(places[neighbours, 2] - places[:, 2, None])
+    near = rise <= math.tan(math.radians(ABYSS)) * away + HEIGHT_NOISE
+    return np.asarray((near & (neighbours != np.arange(len(places))[:, None])).any(axis=1))
+
+
+def _seeds(places: Floats, able: Bools, cell: float) -> Bools:
+    """Lowest point of each cell, of those that may be."""
     chosen = np.zeros(len(places), np.bool_)
-    chosen[order[lowest]] = True
+    some = np.flatnonzero(able) if able.any() else np.arange(len(places))
+    chosen[some[_first_of_each(places[some, :2], places[some, 2], cell)]] = True
     return chosen
 
 
-def _grown(places: Floats, seeds: Bools, chosen: Filter) -> Bools:
-    """Ground among the points of a tile."""
-    order = np.argsort(_curve(places[:, :2], chosen.cell / 4))  # what is near is found from near
-    points = places[order]
-    frame = _frame(points, points[seeds[order]], chosen.cell)
-    corners = _corners(points, seeds[order], frame, chosen)
-    is_ground = np.empty(len(points), np.bool_)
-    is_ground[order] = _classified(points, points[corners], frame, chosen)
-    return is_ground
+def _grown(tile: Tile, chosen: Filter) -> NDArray[np.uint8]:
+    """Classes of all points of a tile."""
+    order = np.argsort(_curve(tile.places[:, :2], chosen.cell / 4))  # what is near is found from near
+    points, able, seeds = tile.places[order], tile.able[order], tile.seeds[order]
+    seeds = seeds if seeds.any() else _seeds(points, able, chosen.cell)
+    frame = _frame(points, points[seeds], chosen.cell)
+    corners = _corners(points, able, seeds, frame, chosen)
+    classes = np.empty(len(points), np.uint8)
+    classes[order] = _classified(points, points[corners], frame, chosen)
+    return classes
 
 
-def _corners(points: Floats, seeds: Bools, frame: Floats, chosen: Filter) -> Ints:
+def _corners(points: Floats, able: Bools, seeds: Bools, frame: Floats, chosen: Filter) -> Ints:
     """Corners that the network has grown: the seeds, and of each square what is lowest and near enough."""
-    lowest = _first_of_each(points[:, :2], points[:, 2], chosen.spacing)
-    corner = np.flatnonzero(seeds)
-    left = np.setdiff1d(lowest, corner)
+    some, corner = np.flatnonzero(able), np.flatnonzero(seeds)
+    left = np.setdiff1d(some[_first_of_each(points[some, :2], points[some, 2], chosen.spacing)], corner)
     for square in _squares(chosen):
         for _ in range(PASSES):
             network = np.concatenate([points[corner], frame])
             above, near = _joins(points[left], network, _triangulated(network), chosen)
             far = cKDTree(network[:, :2]).query(points[left, :2], distance_upper_bound=square / 2)[0] >= square / 2
-            able = np.flatnonzero(near & far)
-            new = able[_first_of_each(points[left[able], :2], above[able], square)]
+            joining = np.flatnonzero(near & far)
+            new = joining[_first_of_each(points[left[joining], :2], above[joining], square)]
             corner = np.concatenate([corner, left[new]])
             left = np.delete(left, new)
             if len(new) <= ENOUGH * len(corner):
@@ -222,8 +248,8 @@ def _corners(points: Floats, seeds: Bools, frame: Floats, chosen: Filter) -> Int
     return corner
 
 
-def _classified(points: Floats, corners: Floats, frame: Floats, chosen: Filter) -> Bools:
-    """Points near the ground.
+def _classified(points: Floats, corners: Floats, frame: Floats, chosen: Filter) -> NDArray[np.uint8]:
+    """Classes of points by their height over the network.
 
     The corners are the lowest points of their squares, and the noise makes the network too low: it is raised by what
     most points are above it. Where they are sparse, that is less than elsewhere: the means of those points decide, too.
@@ -235,7 +261,8 @@ def _classified(points: Floats, corners: Floats, frame: Floats, chosen: Filter) 
     raised = np.asarray(abs(above - np.median(above[likely])) <= chosen.tolerance)
     means = np.concatenate([_means(points[likely], chosen.spacing), frame])
     distance, _, _, _ = _heights(points, means, _triangulated(means))
-    return np.asarray(raised | (distance <= chosen.tolerance))
+    is_ground = raised | (distance <= chosen.tolerance)
+    return np.where(is_ground, GROUND, np.where(above < -chosen.distance, LOW, UNCLASSIFIED)).astype(np.uint8)
 
 
 def _means(points: Floats, side: float) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,8 @@ from typing import Any
 import laspy
 import numpy as np
 from laspy.vlrs.known import WktCoordinateSystemVlr
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from openecho.tables.parquet import require
 from openecho.tables.table import TableError
@@ -37,6 +40,9 @@ CLASSES: Mapping[int, str] = {UNCLASSIFIED: "above ground", GROUND: "ground", LO
 
 NEEDED = ("x", "y", "z")
 
+NEIGHBOURS = 8
+"""In plan, that tell what is usual around a point: how far points are apart, how high they are."""
+
 
 @dataclass(frozen=True)
 class Cloud:
@@ -56,6 +62,22 @@ class Cloud:
     def places(self) -> np.ndarray:
         """x, y and z (n, 3)."""
         return np.column_stack([self.points[axis] for axis in "xyz"])
+
+
+def spacing(points: NDArray[np.float64]) -> float:
+    """Root of the median area that a point (n, 2 or 3) has in plan, m; 1 where that is nothing.
+
+    Parameters
+    ----------
+    points : float64 (n, 2 or 3)
+        m, finite.
+    """
+    count = min(NEIGHBOURS, len(points) - 1)
+    if count < 1:
+        return 1.0
+    distance, _ = cKDTree(points[:, :2]).query(points[:, :2], count + 1, workers=-1)
+    found = float(np.median(distance[:, count])) * math.sqrt(math.pi / count)
+    return found if found > 0 else 1.0
 
 
 def read(path: Path) -> Cloud:

@@ -8,12 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from openecho.surface.points import HIGH, LOW
+from openecho.surface.points import HIGH, LOW, NEIGHBOURS, spacing
 
 Floats = NDArray[np.float64]
-
-NEIGHBOURS = 8
-"""In plan, whose median height says whether a lonely point is above or below."""
 
 SPACINGS = 6.0
 """Mean distances of points in plan, within which a point that is one has company."""
@@ -66,19 +63,11 @@ def unknown(
     left = np.flatnonzero(classes == 0)
     if len(left) > company > 0:
         known = at[left] - at[left].min(axis=0)
-        near = _spacing(known) * SPACINGS if reach is None else reach
+        near = spacing(known) * SPACINGS if reach is None else reach
         lonely = np.flatnonzero(_others(known, near, company) < company)
         above = known[lonely, 2] >= _around(known, lonely)
         classes[left[lonely]] = np.where(above, HIGH, LOW)
     return classes
-
-
-def _spacing(points: Floats) -> float:
-    """Root of the median area that a point has in plan, m."""
-    count = min(NEIGHBOURS, len(points) - 1)
-    distance, _ = cKDTree(points[:, :2]).query(points[:, :2], count + 1, workers=-1)
-    spacing = float(np.median(distance[:, count])) * math.sqrt(math.pi / count)
-    return spacing if spacing > 0 else 1.0
 
 
 def _others(points: Floats, reach: float, most: int) -> NDArray[np.int64]:

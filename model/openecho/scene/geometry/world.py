@@ -138,6 +138,12 @@ def reach(scene: schema.Scene, low: float) -> Extent | None:
     return float(least[0]), float(least[1]), float(most[0]), float(most[1])
 
 
+def ground_heights(scene: schema.Scene, world: World, x: Floats, y: Floats) -> Floats:
+    """Heights (n,) of what trees stand on, at places (n,), m; 0 where there is nothing."""
+    stood_on = [scene.targets[int(number)].kind in GROUND for number in world.shapes[:, 1]]
+    return np.asarray(below(world.shapes[stood_on], world.heights, x.copy(), y.copy(), HIGHEST))
+
+
 class _Builder:
     """Collects the rows of a `World`, target by target."""
 
@@ -166,12 +172,12 @@ class _Builder:
             self._reflect(number, target.reflectance)
             if target.kind in adders:
                 adders[target.kind](target, number)
-        ground = self._ground()
+        ground = self._world()
         for number, target in enumerate(self.scene.targets):
             if target.kind == "tree":
                 self._tree(target, number)
             elif target.kind == "stand":
-                self._stand(target, number, *ground)
+                self._stand(target, number, ground)
         return Built(self._world(), Caster(self.meshes, self.owners), self.spared)
 
     def _seed(self, given: int | None, number: int) -> random_heights.Seed:
@@ -261,7 +267,7 @@ class _Builder:
         edges = z + tree.crown_base, z + tree.height
         self.crowns.append(np.array([(x, y, *edges, tree.crown_width / 2, shape, leaves, number, 0)]))
 
-    def _stand(self, stand: schema.Stand, number: int, shapes: Floats, heights: Floats) -> None:
+    def _stand(self, stand: schema.Stand, number: int, ground: World) -> None:
         rng = np.random.default_rng(self._seed(stand.seed, number))
         expected = stand.density * stand.size[0] * stand.size[1]
         enough_memory(f"targets[{number}].density", f"{expected:.3g} trees", TREE_BYTES * expected)
@@ -269,14 +275,16 @@ class _Builder:
         place = (rng.random((count, 2)) - 0.5) * stand.size + stand.position
         height = np.clip(rng.normal(stand.height, stand.deviation, count), 0.5 * stand.height, 1.5 * stand.height)
         tree = np.arange(count)
-        extent = reach(self.scene, min(float(np.min(heights, initial=0.0, where=np.isfinite(heights))), 0.0))
+        extent = reach(
+            self.scene, min(float(np.min(ground.heights, initial=0.0, where=np.isfinite(ground.heights))), 0.0)
+        )
         if extent is not None:
             far = 0.75 * stand.crown_width * stand.height
             near = (place > np.subtract(extent[:2], far)) & (place < np.add(extent[2:], far))
             tree = np.flatnonzero(near.all(axis=1))
             self.spared[f"targets[{number}] trees"] = count, len(tree)
         place, tall = place[tree], height[tree]
-        foot = below(shapes, heights, place[:, 0].copy(), place[:, 1].copy(), HIGHEST)
+        foot = ground_heights(self.scene, ground, place[:, 0], place[:, 1])
         crowns = np.empty((len(tree), 9))
         crowns[:, :2] = place
         crowns[:, 2], crowns[:, 3] = foot + stand.crown_base * tall, foot + tall
@@ -293,12 +301,6 @@ class _Builder:
         crowns = np.concatenate([np.zeros((0, 9)), *self.crowns])
         heights = np.concatenate([np.zeros(0), *self.heights])
         return World(self.reflectance, shapes, heights, crowns, *_cells(crowns))
-
-    def _ground(self) -> tuple[Floats, Floats]:
-        """Shapes that trees stand on, and heights."""
-        world = self._world()
-        stood_on = [self.scene.targets[int(number)].kind in GROUND for number in world.shapes[:, 1]]
-        return world.shapes[stood_on], world.heights
 
 
 def _cells(crowns: Floats) -> tuple[Floats, Ints, Ints]:
