@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from decimal import Decimal, localcontext
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,46 +10,10 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from openecho.enhance import vondrak
+from openecho.study.extremes.smoothing import exact
 
 LENGTH = 200
-DIGITS = 60
-"""Of the reference: far more than its equations lose, a condition of 10^26 at ε = 10^-12."""
 EPSILONS = tuple(10.0**power for power in range(-12, 13, 2))
-
-
-def exact(
-    samples: NDArray[np.float64], epsilon: float, position: NDArray[np.float64], weight: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Solve (ε P + DᵀD) y' = ε P y by elimination in decimal arithmetic, D y being the third derivatives."""
-    with localcontext() as context:
-        context.prec = DIGITS
-        y, x, p = ([Decimal(float(v)) for v in values] for values in (samples, position, weight))
-        count, scale = len(y), Decimal(epsilon)
-        matrix = [[Decimal(0)] * count for _ in y]
-        right = [scale * p_i * y_i for p_i, y_i in zip(p, y, strict=True)]
-        for i in range(count):
-            matrix[i][i] = scale * p[i]
-        for first in range(count - 3):
-            columns = range(first, first + 4)
-            step = (x[first + 2] - x[first + 1]).sqrt()
-            row = dict.fromkeys(columns, 6 * step)
-            for i in columns:
-                for j in columns:
-                    row[i] /= x[i] - x[j] if i != j else 1
-            for i in columns:
-                for j in columns:
-                    matrix[i][j] += row[i] * row[j]
-        for k in range(count):
-            for i in range(k + 1, min(k + 4, count)):
-                factor = matrix[i][k] / matrix[k][k]
-                right[i] -= factor * right[k]
-                for j in range(k, min(k + 4, count)):
-                    matrix[i][j] -= factor * matrix[k][j]
-        solved = [Decimal(0)] * count
-        for k in reversed(range(count)):
-            known = sum((matrix[k][j] * solved[j] for j in range(k + 1, min(k + 4, count))), Decimal(0))
-            solved[k] = (right[k] - known) / matrix[k][k]
-        return np.array([float(value) for value in solved])
 
 
 def waveform(seed: int) -> NDArray[np.float64]:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from openecho.surface.ground import Filter, ground, tiles
+from openecho.surface.ground import Filter, filtered, ground, suited, tiles
+from openecho.surface.points import GROUND, LOW, UNCLASSIFIED
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -145,3 +146,33 @@ def test_bad_settings_are_one_line(settings: dict[str, float], message: str) -> 
 def test_points_of_two_columns_are_one_line() -> None:
     with pytest.raises(ValueError, match=r"^points: found shape \(3, 2\), expected \(n, 3\)$"):
         ground(np.zeros((3, 2)))
+
+
+def mountain(depth: float, seed: int = 0) -> tuple[Floats, Bools]:
+    """Points 10 m apart on relief of up to 40°, 40 of them so far above it, m, and which are ground."""
+    print(f"seed {seed}")
+    rng = np.random.default_rng(seed)
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0, 600, 10.0), np.arange(0, 600, 10.0)))
+    x, y = x + rng.uniform(-2, 2, x.size), y + rng.uniform(-2, 2, x.size)
+    z = 60 * np.sin(x / 110) * np.cos(y / 130) + 5 * np.sin(x / 31 + y / 37) + rng.normal(0, 0.1, x.size)
+    off = np.zeros(x.size, np.bool_)
+    off[rng.choice(x.size, 40, replace=False)] = True
+    return np.column_stack([x, y, z + np.where(off, depth, 0)]), ~off
+
+
+def test_settings_suit_points_however_sparse() -> None:
+    assert suited(scene("forest")[0]) == Filter()
+    sparse = suited(mountain(0)[0])
+    assert sparse.spacing == pytest.approx(5, rel=0.1)
+    assert sparse.angle == pytest.approx(45, rel=0.1)
+
+
+@pytest.mark.parametrize("depth", [-150.0, -60.0, -25.0, 20.0, 100.0])
+def test_echoes_far_from_sparse_ground_are_no_ground_and_do_not_move_it(depth: float) -> None:
+    points, truth = mountain(depth)
+    chosen = suited(points)
+    (tile,) = tiles(points, chosen)
+    classes = filtered(tile, chosen)[np.argsort(tile.inner)]
+    assert (classes[truth] == GROUND).mean() > 0.999
+    # Of two side by side each sees the other.
+    assert (classes[~truth] == (LOW if depth < 0 else UNCLASSIFIED)).sum() >= 39

@@ -89,7 +89,7 @@ def fly(name: str, folder: Path, seed: int, share: float, advance: Advance) -> F
 def settings(flight: Flight, method: str) -> dict[str, Any]:
     """What a method is told: the core has its sharpest filter, fits know the pulse and how noise is coloured."""
     if method == "inflection":
-        return {"taps": "nasa3.5", "k": 4.0, "sample_w": 16}
+        return {"taps": "nasa3.5", "k": 6.0, "sample_w": 16}
     told: Mapping[str, Any] = told_of_scene(flight.ready.instrument)
     return dict(told["gaussian" if method == "gaussian" else "laser"])
 
