@@ -138,3 +138,53 @@ def test_echoes_without_any_place_are_one_line(tmp_path: Path) -> None:
     np.savez(tmp_path / "echoes.npz", x=np.full(3, np.nan), y=np.zeros(3), z=np.zeros(3))
     with pytest.raises(TableError, match=r"echoes.npz: found 3 echoes, none with a position, expected some$"):
         surface_file(Surfacing(tmp_path / "echoes.npz", tmp_path / "dem.tif"))
+
+
+def odd_clouds() -> dict[str, np.ndarray]:
+    """Points (n, 3) that no terrain is made of as a rule."""
+    rng = np.random.default_rng(3)
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0, 40.0), np.arange(0, 40.0)))
+    hills = np.column_stack([x, y, 3 * np.sin(x / 9) + 100])
+    wild, nowhere = hills.copy(), hills.copy()
+    wild[::50, 2] = rng.choice([1e9, -1e9, 1e300, -1e300], len(wild[::50]))
+    nowhere[::3] = np.nan
+    wall = np.column_stack([np.full(2000, 5.0), rng.uniform(0, 30, 2000), rng.uniform(0, 60, 2000)])
+    return {
+        "flat": hills * (1, 1, 0),
+        "single point": hills[:1],
+        "two points": hills[:2],
+        "collinear": np.column_stack([np.arange(300.0), np.arange(300.0), np.full(300, 7.0)]),
+        "duplicates": np.repeat(hills[:60], 40, axis=0),
+        "all one place": np.repeat(hills[:1], 500, axis=0),
+        "wall alone": wall,
+        "wall on ground": np.concatenate([hills, np.add(wall, (0, 0, 100))]),
+        "wildly wrong": wild,
+        "one in three nowhere": nowhere,
+    }
+
+
+@pytest.mark.parametrize("kind", odd_clouds())
+def test_odd_clouds_have_a_valid_result(tmp_path: Path, kind: str) -> None:
+    points = odd_clouds()[kind]
+    columns = dict(zip("xyz", points.T, strict=True)) | {"amplitude": np.ones(len(points))}
+    np.savez(tmp_path / "echoes.npz", waveform=np.arange(len(points)), number=np.zeros(len(points), int), **columns)
+    paths = {"--dsm": tmp_path / "dsm.tif", "--points": tmp_path / "points.las"}
+    options = [part for pair in paths.items() for part in pair]
+    done = openecho(tmp_path / "echoes.npz", "-o", tmp_path / "dem.tif", *options)
+    assert (done.returncode, done.stderr) == (0, "")
+    heights, cloud = grid(tmp_path / "dem.tif"), read(tmp_path / "points.las")
+    known = np.isfinite(points).all(axis=1)
+    usual = known & (abs(points[:, 2]) < 1e6)
+    low, high = points[usual, 2].min(), points[usual, 2].max()
+    assert np.isfinite(heights).any()
+    assert np.nanmin(heights) >= low - 1e-3
+    assert np.nanmax(heights) <= high + 1e-3
+    assert np.count_nonzero(cloud.points["class"] == GROUND) > 0
+    if kind in ("flat", "duplicates", "one in three nowhere"):
+        assert (cloud.points["class"] == GROUND).all()
+    if kind == "wildly wrong":  # LAS has no room for the others
+        assert len(cloud.points) == np.count_nonzero(usual)
+        assert (cloud.points["class"] == GROUND).all()
+    if kind == "wall on ground":
+        assert (cloud.points["class"][: len(points) - 2000] == GROUND).mean() > 0.97
+        assert (cloud.points["class"][len(points) - 2000 :] == GROUND).mean() < 0.1

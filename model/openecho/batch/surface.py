@@ -21,6 +21,9 @@ GRIDS = (".tif", ".tiff")
 POINTS = (".las", ".laz")
 MESHES = (".ply",)
 
+DEEPEST, TALLEST = -11_000.0, 10_000.0
+"""m: no land and no sea floor is lower, none is higher."""
+
 
 @dataclass(frozen=True)
 class Surfacing:
@@ -64,8 +67,8 @@ class Surfacing:
     smoothing: float = 0.0
     reach: float = np.inf
     settings: Mapping[str, float] = field(default_factory=dict)
-    lowest: float = -np.inf
-    highest: float = np.inf
+    lowest: float = DEEPEST
+    highest: float = TALLEST
     system: str | None = None
     jobs: int = 1
     scheduler: str | None = None

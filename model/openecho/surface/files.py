@@ -31,6 +31,9 @@ OFFSET = "comment offset"
 STEP = 1e-3
 """Of LAS coordinates, m."""
 
+MOST_AWAY = STEP * (2**31 - 2**10)
+"""Of a point of LAS from its offset, m."""
+
 
 def coordinate_system(text: str | None) -> Any:
     """A coordinate system of rasterio from OGC WKT or EPSG:NUMBER; a local one if there is none.
@@ -187,7 +190,8 @@ def read_mesh(path: Path) -> tuple[Floats, NDArray[np.int64]]:
 def write_points(path: Path, cloud: Cloud) -> None:
     """Write points with their classes as LAS 1.4, or LAZ, complete or not at all.
 
-    Width and waveform are dimensions of their own; points without a place, for which LAS has none, are left out.
+    Width and waveform are dimensions of their own. Points for which LAS has no place are left out: those without one,
+    and those more than two thousand kilometres from the middle of all.
     """
     header = laspy.LasHeader(version="1.4", point_format=6)
     header.add_extra_dims(
@@ -198,7 +202,9 @@ def write_points(path: Path, cloud: Cloud) -> None:
     )
     points = cloud.points[np.isfinite(cloud.places).all(axis=1)]
     header.scales = np.full(3, STEP)
-    header.offsets = np.array([np.floor(points[axis][:1].sum()) for axis in "xyz"])
+    header.offsets = np.array([np.floor(np.median(points[axis])) if len(points) else 0 for axis in "xyz"])
+    away = np.stack([abs(points[axis] - middle) for axis, middle in zip("xyz", header.offsets, strict=True)])
+    points = points[(away < MOST_AWAY).all(axis=0)]
     header.generating_software = "OpenEcho"
     header.global_encoding.wkt = True
     if cloud.wkt is not None:

@@ -65,7 +65,9 @@ class Cloud:
 
 
 def spacing(points: NDArray[np.float64]) -> float:
-    """Root of the median area that a point (n, 2 or 3) has in plan, m; 1 where that is nothing.
+    """Root of the area that a point (n, 2 or 3) usually has in plan, m; 1 where that is nothing.
+
+    Usually: over the area, not over the points, of which a wall may have more than the ground.
 
     Parameters
     ----------
@@ -75,7 +77,11 @@ def spacing(points: NDArray[np.float64]) -> float:
     count = min(NEIGHBOURS, len(points) - 1)
     if count < 1:
         return 1.0
-    distance, _ = cKDTree(points[:, :2]).query(points[:, :2], count + 1, workers=-1)
+    plan = points[:, :2]
+    side = math.sqrt(np.ptp(plan, axis=0).prod() / len(plan))
+    cells = np.floor((plan - plan.min(axis=0)) / (side or 1.0))
+    _, spread = np.unique(cells, axis=0, return_index=True)
+    distance, _ = cKDTree(plan).query(plan[spread], count + 1, workers=-1)
     found = float(np.median(distance[:, count])) * math.sqrt(math.pi / count)
     return found if found > 0 else 1.0
 
