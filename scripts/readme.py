@@ -325,51 +325,11 @@ def limits(content: dict[str, Any]) -> list[str]:
     return ["| | tried | guaranteed | found |", "| --- | --- | --- | --- |", *rows, "", made]
 
 
-def ground_filters(content: dict[str, Any]) -> list[str]:
-    """Errors of both ground filters on each scene, and of the elevation models behind them and behind the truth."""
-    head = ("scene", "filter", "points", "type I", "type II", "total", "DEM RMSE, m", "95 % within, m")
-    return table(
-        head,
-        (
-            (
-                row["scene"],
-                row["filter"] + (f", best of {row['tried']}" if "tried" in row else ""),
-                f"{row['points']:,}",
-                *(f"{row[name]:.2%}" for name in ("type_1", "type_2", "total")),
-                f"{row['model_rms']:.3f}",
-                f"{row['model_95']:.3f}",
-            )
-            for row in content["filters"]
-        ),
-    )
-
-
-def mountain(content: dict[str, Any]) -> list[str]:
-    """What each method makes of the mountain strip, and what a million points cost."""
-    head = ("waveforms", "method", "echoes", "ground found", "its RMS error, m", "filter, total", "DEM RMSE, m")
-    rows = [
-        (
-            row["waveforms"],
-            row["method"],
-            f"{row['echoes']:,}",
-            f"{row['echoes_of_ground']:.1%}",
-            f"{row['ground_rms']:.3f}",
-            f"{row['total']:.2%}",
-            f"{row['model_rms']:.3f}",
-        )
-        for row in content["experiment"]
-    ]
-    cost = [f"{row['points']:,} in {row['unknown'] + row['filter'] + row['grid']:.1f} s" for row in content["cost"]]
-    return [*table(head, rows), "", f"Points filtered and gridded: {', '.join(cost)}."]
-
-
 LONG_PARTS: dict[str, tuple[str, Callable[[dict[str, Any]], list[str]]]] = {
     "claims": ("trade", claims),
     "choice": ("trade", choice),
     "paper": ("trade", paper),
     "limits": ("extremes", limits),
-    "filters": ("terrain", ground_filters),
-    "mountain": ("terrain", mountain),
     "area": ("synth", area),
     "fits": ("bench", fits),
 }
