@@ -295,7 +295,14 @@ def test_whatever_ends_a_run_the_next_goes_on(tmp_path: Path, sent: signal.Signa
     source, output, partial = tmp_path / "granule.h5", tmp_path / "echoes.csv", tmp_path / "echoes.csv.partial"
     granule(source, 24_000, 0)
     command: list[str | Path] = [PROGRAM, "decompose", source, "-o", output, "--jobs", str(jobs)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+
+    def heed() -> None:
+        # What a shell starts in the background, these tests among it, ignores interrupts.
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed
+    ) as process:
         while not list(partial.glob("[0-9]*.npz")):
             assert process.poll() is None
             time.sleep(0.01)
