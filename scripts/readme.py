@@ -50,8 +50,8 @@ def with_long_studies(text: str) -> str:
         if content["quick"]:
             continue
         text = replaced(text, name, lines(content))
-        for picture in report.FOLDER.glob(f"{source}*.png"):
-            shutil.copyfile(picture, DOCS / picture.name)
+        if path.with_suffix(".png").exists():
+            shutil.copyfile(path.with_suffix(".png"), DOCS / f"{source}.png")
     return text
 
 
